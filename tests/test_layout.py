@@ -62,7 +62,7 @@ COVERED = {
     "shortcuts": "studies/test_trade",
     "zwidth": "walls/test_zwidth",
 }
-MOST_ARGUMENTS, MOST_LINES = 9, 60
+MOST_ARGUMENTS, MOST_LINES, MOST_LINES_OF_HARDWARE = 9, 60, 100
 CONFIG = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 EXTRAS = CONFIG["project"]["optional-dependencies"]
 PROVIDERS = importlib.metadata.packages_distributions()
@@ -226,18 +226,23 @@ def size(function: ast.FunctionDef | ast.AsyncFunctionDef) -> tuple[int, int]:
 
 @pytest.mark.parametrize("path", SOURCES, ids=identity)
 def test_functions_are_short_and_take_few_arguments(path):
-    """A command of the command line has as many options as it offers; hardware is described in one piece."""
+    """A command of the command line has as many options as it offers; an `elaborate` joins many ports."""
     a_command = path.is_relative_to(ROOT / "cli")
     long = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             arguments, lines = size(node)
             of_the_command_line = a_command and (node.name == "command" or bool(node.decorator_list))
-            if (arguments > MOST_ARGUMENTS and not of_the_command_line) or (
-                lines > MOST_LINES and node.name != "elaborate"
-            ):
+            most = MOST_LINES_OF_HARDWARE if node.name == "elaborate" else MOST_LINES
+            if (arguments > MOST_ARGUMENTS and not of_the_command_line) or lines > most:
                 long.append(f"{node.name}: {arguments} arguments, {lines} lines")
     assert long == []
+
+
+def test_hardware_finds_ports_by_their_names_in_one_place():
+    calls = re.compile(r"\b[gs]etattr\(")
+    sources = [path for path in SOURCES if path.is_relative_to(ROOT / "hdl")]
+    assert {identity(path) for path in sources if calls.search(path.read_text(encoding="utf-8"))} == {"hdl/wires"}
 
 
 def test_the_model_needs_only_numpy_and_numba():

@@ -8,11 +8,12 @@ from hardwall.model.axes.axis import AxesSpec
 from hardwall.model.axes.registers import OF_CAPTURE, AxesMap
 from hardwall.model.link import uart
 
-from ..axis.supervised import COMPLEMENTS, LOOPS
+from ..axis.supervised import LOOPS
 from ..board.clocks import board_clocks
 from ..board.lead_out import lead_out
 from ..drive.registry import block_of
 from ..link.link import Link
+from ..wires import given, ports
 from .capture import AxesCapture
 from .supervised import SupervisedAxes
 
@@ -128,24 +129,24 @@ class AxesBoard(wiring.Component):
         m.submodules.axes, m.submodules.link = axes, link = self.axes, self.link
         running, stood, reset = board_clocks(m, self)
 
-        loops = {"drive_enable": self.drive_enable & running}
+        loops = ports(self, LOOPS) | {"drive_enable": self.drive_enable & running}
         m.d.comb += lead_out(axes, self, ENCODER)
         m.d.comb += axes.slip.eq(stood.replicate(self.spec.axes))
         m.d.comb += lead_out(link, self, link.PINS)
         # A channel without a complement is unlike what stands for that, whatever the clock edge sees.
-        m.d.comb += [getattr(axes, name).eq(~getattr(axes, name[:-2])) for name in COMPLEMENTS]
-        for name in LOOPS:
-            m.d.comb += getattr(axes, name).eq(loops.get(name, getattr(self, name)).replicate(self.spec.axes))
-        parts = {False: axes}
+        m.d.comb += [axes.encoder_a_n.eq(~axes.encoder_a), axes.encoder_b_n.eq(~axes.encoder_b)]
+        m.d.comb += given(axes, {name: loop.replicate(self.spec.axes) for name, loop in loops.items()})
+        parts = {False: ports(axes)}
         if self.capture:
-            m.submodules.capture = parts[True] = capture = self.capture
+            m.submodules.capture = capture = self.capture
+            parts[True] = ports(capture)
             shown = (name for name in capture.signature.members if not name.startswith(OF_CAPTURE))
-            m.d.comb += [getattr(capture, name).eq(getattr(axes, name)) for name in shown]
-        for name, member in link.signature.members.items():
+            m.d.comb += given(capture, ports(axes, shown))
+        for name, ours in ports(link).items():
             if name in link.PINS:
                 continue
-            ours, theirs = getattr(link, name), getattr(parts[name.startswith(OF_CAPTURE)], name)
-            m.d.comb += theirs.eq(ours) if member.flow == Out else ours.eq(theirs)
+            theirs = parts[name.startswith(OF_CAPTURE)][name]
+            m.d.comb += theirs.eq(ours) if link.signature.members[name].flow == Out else ours.eq(theirs)
         permitted = self.drive_enable & self.emergency_stop & running
         for number, stage in enumerate(self.stages):
             m.submodules[f"stage_{number}"] = stage

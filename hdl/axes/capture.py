@@ -13,6 +13,7 @@ from ..arithmetic.fixed import shape
 from ..axis.capture import Capture
 from ..block import Block
 from ..link.axis_status import word_of
+from ..wires import given, names_of, ports
 
 OUTPUTS = "capture_state", "capture_place", "capture_stamp"
 
@@ -101,11 +102,11 @@ class AxesCapture(Block):
         velocity = self.record_velocity >> len(self.record_velocity) - len(memory.velocity)
         seen = {"count": self.record_count, "velocity": velocity, "wall_force": self.record_wall_force}
         seen |= {"flags": self.record_flags}
-        for name, value in seen.items():
-            held = Signal.like(getattr(memory, name), name=f"held_{name}")
+        for name, taken in ports(memory, seen).items():
+            held = Signal.like(taken, name=f"held_{name}")
             with m.If(recorded):
-                m.d.sync += held.eq(value)
-            m.d.comb += getattr(memory, name).eq(held)
+                m.d.sync += held.eq(seen[name])
+            m.d.comb += taken.eq(held)
         driven, states = Signal.like(memory.driven, name="held_driven"), Signal(2 * self.design.spec.axes)
         magnitude = word_of(self.magnitude, axis, self.design.spec.axes)
         with m.If(self.turn_valid):
@@ -122,10 +123,10 @@ class AxesCapture(Block):
             memory.sampled.eq(self._late(m, recorded, SAMPLED)),
             memory.capture_start.eq(self._late(m, self.capture_start, PULSED)),
             memory.capture_trigger.eq(self._late(m, self.capture_trigger, PULSED)),
-            *(getattr(memory, word.name).eq(getattr(self, word.name)) for word in memory.design.words),
+            *given(memory, ports(self, names_of(memory.design.words))),
             self.capture_data.eq(memory.data),
             self.capture_done.eq(memory.done),
-            *(getattr(self, name).eq(getattr(memory, name)) for name in OUTPUTS),
+            *given(self, ports(memory, OUTPUTS)),
         ]
         return m
 

@@ -38,8 +38,10 @@ class Doors:
         self._shut = [
             Cat(each[axis] for each in (*opened.values(), *self.waiting.values())).any() for axis in range(pipe.axes)
         ]
-        for name in ("negative", "armed", "alive", "drive_inverted"):
-            setattr(self, name, Signal(pipe.axes, name=name))
+        self.negative = Signal(pipe.axes)
+        self.armed = Signal(pipe.axes)
+        self.alive = Signal(pipe.axes)
+        self.drive_inverted = Signal(pipe.axes)
 
     def let_out(self, judged: Judged, wave: Value, invert: Value, stage: int) -> None:
         """Let out what a turn decides, in that stage.

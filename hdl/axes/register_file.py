@@ -2,32 +2,22 @@
 
 from amaranth.hdl import Cat, Const, Module, Mux, Shape, ShapeLike, Signal, Value
 from amaranth.lib import wiring
-from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Member, Out
 
 from hardwall.model.axes.register_file import Design
 from hardwall.model.axes.registers import BANK, is_shared
 from hardwall.model.axis.register_file import CELL_BITS, Area, Operation
-from hardwall.model.axis.registers import (
-    ACTIVE,
-    CAPTURE,
-    COUNTERS,
-    END,
-    LIVE,
-    MAP,
-    PULSES,
-    SUPERVISOR,
-    TELEMETRY,
-    WRITTEN,
-)
-from hardwall.model.axis.supervisor import ARMED
+from hardwall.model.axis.registers import ACTIVE, END, LIVE, TELEMETRY, WRITTEN
 from hardwall.model.register import Kind, Register
 
 from ..arithmetic.fixed import less, shape
-from ..axis.register_file import exclusive_of
-from ..link.axis_status import Moments, held_status, shown, word_of
-from ..link.line import UNMIXED
+from ..link.axis_status import shown
+from ..link.checks import Bounds, Pulses, check_read
 from ..link.requests import Requests
+from ..wires import given, port
+from .at_address import At, Axes, at_address, refused
+from .cells import Cells
+from .commit_walk import CommitWalk
 
 
 def _given(design: Design) -> dict[str, ShapeLike]:
@@ -135,269 +125,212 @@ class BankedFile(wiring.Component):
         walked = {True: len(self._design.registers.words) + 2, False: 2}
         return {commits: 2 * 3 * words + 3 + self._design.settle_clocks for commits, words in walked.items()}
 
-    def _refused(self, m: Module, wanted: Value, asking: Value) -> Value:
-        """Return whether a pulse that is wanted of an axis is refused, after what its last turn has shown."""
-        banks = self._design.banks
-        ready, armed = Signal(banks), Signal(banks)
-        for axis in range(banks):
-            with m.If(self.turn_valid & (self.turn_axis == axis)):
-                m.d.sync += [ready[axis].eq(self.turn_ready), armed[axis].eq(self.turn_state == ARMED)]
-        moving = word_of(armed, asking, banks)
-        refusing = {"arm": ~word_of(ready, asking, banks), "preload": moving, "origin_shift": moving}
-        names = [pulse.name for pulse in self._design.registers.pulses]
-        return Cat(wanted[bit] & refusing[name] for bit, name in enumerate(names) if name in refusing).any()
-
     def elaborate(self, platform):
         m = Module()
-        design, registers, host = self._design, self._design.registers, self.host
-        banks = design.banks
-        # Cells of all banks; and what never changes: the areas of one bank, and behind them the window to the map.
-        within = (max(len(design.book), len(design.map_cells)) - 1).bit_length()
-        book = design.book + [0] * ((1 << within) - len(design.book)) + design.map_cells
-        depth = 1 << (BANK * banks - 1).bit_length()
-        m.submodules.cells = cells = Memory(shape=CELL_BITS, depth=depth, init=[], attrs=UNMIXED)
-        m.submodules.book = fixed = Memory(shape=CELL_BITS, depth=2 << within, init=book, attrs=UNMIXED)
-        cell, write, text = cells.read_port(), cells.write_port(), fixed.read_port()
-
-        # What there is at the address.
-        address = host.address
-        place, bank = address[: (END - 1).bit_length()], address[(END - 1).bit_length() : (depth - 1).bit_length()]
-        in_map, in_capture = (address[14:] == MAP >> 14) & less(address[:14], len(design.map_cells)), Const(0)
-        # Each is a signal of its own: an expression would be written out wherever it is asked for.
-        in_banks, wide, is_pulse, is_status = Signal(), Signal(), Signal(), Signal()
-        status_places = Cat(place[5:] == block >> 5 for block in (TELEMETRY, SUPERVISOR)).any()
-        m.d.comb += [
-            in_banks.eq(less(address, BANK * banks)),
-            # Counters and pulses have one register.
-            wide.eq(in_banks & (place[5:] != COUNTERS >> 5)),
-            is_pulse.eq(in_banks & (place[4:] == PULSES >> 4)),
-            is_status.eq(in_banks & status_places),
-        ]
-        half = wide & ((host.first & place[0]) | (host.last & ~place[0]))
-        marks = Signal(len(registers.pulses))
-        wanted = Signal.like(marks)
-        for bit, pulse in enumerate(registers.pulses):
-            m.d.comb += wanted[bit].eq(is_pulse & (place[:4] == pulse.address % 16) & host.value[0])
-
-        # The axis at the address, the one that a frame writes to, and the one whose status it reads, if any.
-        here, to, asked = (Signal(range(max(banks, 2)), name=name) for name in ("here", "to", "asked"))
+        design, host = self._design, self.host
+        cells = Cells(m, design)
+        at = at_address(m, self, cells.depth)
+        pulses = Pulses(m, host, design.registers, at.is_pulse, at.place)
+        here, to, asked = (Signal(range(max(design.banks, 2)), name=name) for name in ("here", "to", "asked"))
         asks = Signal()
-        m.d.comb += here.eq(bank)
-        names = [pulse.name for pulse in registers.pulses]
-        exclusive, after, several = exclusive_of(wanted, names, host.clear)
-        refused = self._refused(m, wanted, here) | several
-        with m.If(host.clear):
-            m.d.sync += [host.absent.eq(0), host.outside.eq(0), host.refused.eq(0), asks.eq(0), exclusive.eq(0)]
-
-        # What `shift` takes: a cell, a text, a status, or the host's value. What it had goes to `upper`.
-        shift, upper = Signal(CELL_BITS), Signal(CELL_BITS)
-        moments = Moments(*(Signal(name=name) for name in Moments._fields))
-        status = held_status(m, self, asked, moments)
-        takes = {"value": host.value, "status": status}
-        if registers.capture:
-            in_capture = (address[15:] == CAPTURE >> 15) & less(address[:15], registers.capture_registers)
-            # That memory is large, and far away: what it gives has a register of its own first.
-            takes["capture"] = arrived = Signal(CELL_BITS)
-            m.d.comb += self.capture_address.eq(address)
-            m.d.sync += arrived.eq(self.capture_data & self.capture_done.replicate(CELL_BITS))
-        # A memory is slow, and the last of these has the shortest way.
-        takes |= {"text": text.data, "cell": cell.data}
-        taking = {name: Signal(name=f"taking_{name}") for name in takes}
-        for name, taken in taking.items():
-            with m.If(taken):
-                m.d.sync += [shift.eq(takes[name]), upper.eq(shift)]
-
-        # One subtraction compares a bound with a value: signed at the top of a value, and only as long as all above
-        # it was equal.
-        top, tied, difference = ~wide | ~place[0], Signal(2, init=3), Signal(CELL_BITS + 1)
-        bound, value = (Cat(each[:-1], each[-1] ^ top) for each in (shift, host.value))
-        m.d.comb += [difference.eq(bound - value), host.data.eq(shift)]
-        equal = ~difference.any()
-
-        # A walk through cells: all of them after a reset; and at a FINISH the words of a bank, and behind them the
-        # count of a preload and the causes that the host has read.
-        words, commit = len(registers.words), marks[names.index("commit")]
-        step, low, settling = Signal(range(BANK * banks)), Signal(), Signal(range(design.settle_clocks + 1))
-        count, causes = registers["active_preload_count"].address, registers["acknowledged"].address
-        copies, halfway = Signal(), Signal(range(END - WRITTEN))
-        m.d.comb += copies.eq(less(step, words))
-        beside = Mux(step == words, count - WRITTEN, causes - WRITTEN)
-        m.d.comb += halfway.eq(Mux(copies, Cat(low, step[:4]), beside | low))
-        walked = halfway | WRITTEN
-
-        area, window = Signal(Area), Signal()
-        m.d.comb += [
-            text.addr.eq(Cat(place, Mux(window, address[len(place) : within], area), window)),
-            cell.addr.eq(Cat(place, bank)),
-            write.addr.eq(Cat(place, bank)),
-            write.data.eq(shift),
-        ]
-        m.d.sync += [self.word_write.eq(0), *(getattr(self, pulse.name).eq(0) for pulse in registers.pulses)]
-
-        def give(word: Register, axis: Value, value: Value):
-            """Give a word that is whole to its port, or to the axis."""
-            if is_shared(word):
-                m.d.sync += getattr(self, word.name).eq(value)
-            elif (number := design.numbers.get(word.address + 1)) is not None:
-                m.d.sync += [self.word_write.eq(1), self.word_axis.eq(axis), self.word_number.eq(number)]
-                m.d.sync += self.word_value.eq(value)
-
+        m.d.comb += here.eq(at.bank)
+        axes = Axes(here, to, asked, asks)
+        refuses = refused(m, self, pulses.wanted, here) | pulses.several
+        pulses.begin(m, host, asks.eq(0))
+        cells.take(m, self, asked)
+        bounds = self._bounds(m, at, cells.shift)
+        walk = CommitWalk(m, design, pulses.marked("commit"))
+        cells.address(m, host.address, at.place, at.bank)
+        m.d.sync += [self.word_write.eq(0), *given(self, dict.fromkeys(pulses.names, 0))]
         with m.FSM():
-            with m.State("BOOT"):
-                m.d.comb += text.addr.eq(Cat(step[: len(place)], Const(Area.RESET, Shape.cast(Area))))
-                m.next = "BOOT_TAKE"
-            with m.State("BOOT_TAKE"):
-                m.d.comb += taking["text"].eq(1)
-                m.next = "BOOT_STORE"
-            with m.State("BOOT_STORE"):
-                begun = step[: len(place)]
-                once = less(begun, TELEMETRY) | Cat(begun == own for own in sorted(design.own_places)).any()
-                m.d.comb += [write.addr.eq(step), write.en.eq(1)]
-                with m.If(once & step[len(place) :].any()):
-                    m.d.comb += write.data.eq(0)
-                m.d.sync += step.eq(step + 1)
-                m.next = "BOOT"
-                with m.If(step == BANK * banks - 1):
-                    m.next = "BEGIN"
-            with m.State("BEGIN"), m.If(self.word_ready):
-                m.next = "IDLE"
+            self._boot(m, cells, walk)
             with m.State("IDLE"):
-                m.d.comb += window.eq(address[14])
-                m.d.sync += low.eq(0)
+                m.d.comb += cells.window.eq(host.address[14])
+                m.d.sync += walk.low.eq(0)
                 with m.If(host.start), m.Switch(host.operation):
-                    with m.Case(Operation.CHECK_READ):
-                        with m.If(~(in_banks | in_map | in_capture) | half):
-                            m.d.sync += host.absent.eq(1)
-                        if registers.capture:
-                            with m.If(in_capture & ~self.capture_done):
-                                m.d.sync += host.refused.eq(1)
-                        with m.If(is_status):
-                            m.d.sync += [asks.eq(1), asked.eq(here)]
-                        m.next = "DONE"
-                    with m.Case(Operation.CHECK_WRITE):
-                        m.d.comb += [area.eq(Area.LEAST), window.eq(0)]
-                        word = ~less(place, design.first_pulse) & less(place, design.last_word)
-                        live = ~less(place, LIVE) & less(place, design.last_live)
-                        own = Cat(place == each for each in sorted(design.own_places)).any() & bank.any()
-                        with m.If(~in_banks | ~(word | live) | own | half):
-                            m.d.sync += host.absent.eq(1)
-                        with m.If(refused):
-                            m.d.sync += host.refused.eq(1)
-                        m.d.sync += exclusive.eq(after)
-                        m.next = "LEAST"
-                    with m.Case(Operation.READ):
-                        m.next = "READ"
-                    with m.Case(Operation.WRITE):
-                        m.next = "TAKE"
-                        m.d.sync += marks.eq(marks | wanted)
-                    with m.Case(Operation.COUNT):
-                        m.next = "COUNT"
-                    with m.Case(Operation.FINISH):
-                        m.d.sync += step.eq(Mux(commit, 0, words))
-                        m.next = "DONE"
-                        with m.If(marks.any()):
-                            m.next = "WALK"
-                    with m.Case(Operation.SNAPSHOT):
-                        m.next = "DONE"
-                        with m.If(asks):
-                            m.next = "STROBE"
-            with m.State("READ"):
-                m.d.comb += [
-                    taking["status"].eq(is_status),
-                    taking["cell"].eq(in_banks & ~is_status),
-                    taking["text"].eq(~in_banks),
-                ]
-                m.next = "DONE"
-                if registers.capture:
-                    with m.If(address[15]):
-                        m.next = "READ_CAPTURE"
-            if registers.capture:
-                with m.State("READ_CAPTURE"):
-                    m.d.comb += taking["capture"].eq(1)
-                    m.next = "DONE"
-            with m.State("LEAST"):
-                m.d.comb += [area.eq(Area.MOST), taking["text"].eq(1)]
-                m.next = "ABOVE"
-            with m.State("ABOVE"):
-                m.d.comb += taking["text"].eq(1)
-                m.d.sync += tied[0].eq((top | tied[0]) & equal)
-                with m.If((top | tied[0]) & ~difference[-1] & ~equal):
-                    m.d.sync += host.outside.eq(1)
-                m.next = "BELOW"
-            with m.State("BELOW"):
-                m.d.sync += tied[1].eq((top | tied[1]) & equal)
-                with m.If((top | tied[1]) & difference[-1]):
-                    m.d.sync += host.outside.eq(1)
-                m.next = "DONE"
-            with m.State("TAKE"):
-                m.d.comb += taking["value"].eq(1)
-                m.d.sync += to.eq(here)
-                # The upper half has been written just before, and is still there.
-                with m.Switch(place):
-                    for word in registers.live:
-                        with m.Case(word.address + 1):
-                            give(word, here, Cat(host.value, shift))
-                m.next = "KEEP"
-            with m.State("KEEP"):
-                m.d.comb += write.en.eq(~is_pulse)
-                m.next = "DONE"
-            with m.State("COUNT"):
-                m.d.comb += taking["cell"].eq(1)
-                m.next = "COUNTED"
-            with m.State("COUNTED"):
-                m.d.comb += [write.data.eq(shift + 1), write.en.eq(1)]
-                m.next = "DONE"
-
-            # The high half of a value first, and then both are there.
-            with m.State("WALK"):
-                m.d.comb += cell.addr.eq(Cat(walked, to))
-                m.next = "WALKED"
-            with m.State("WALKED"):
-                m.d.comb += taking["cell"].eq(1)
-                m.next = "WALK_STORE"
-            with m.State("WALK_STORE"):
-                m.d.comb += [write.addr.eq(Cat(walked ^ (ACTIVE ^ WRITTEN), to)), write.en.eq(copies)]
-                m.d.sync += [low.eq(~low), step.eq(step + low)]
-                m.next = "WALK"
-                with m.If(low), m.Switch(step):
-                    for at, word in enumerate(registers.words):
-                        with m.Case(at):
-                            give(word, to, Cat(shift, upper))
-                    with m.Case(words):
-                        m.d.sync += self.preload_count.eq(Cat(shift, upper))
-                    with m.Case(words + 1):
-                        m.d.sync += [self.acknowledged.eq(Cat(shift, upper)), step.eq(0)]
-                        m.next = "PULSE"
-            with m.State("PULSE"):
-                for bit, pulse in enumerate(registers.pulses):
-                    # One of all axes has a single bit, which is that of the only bank that it is written to in.
-                    m.d.sync += getattr(self, pulse.name).eq(Mux(marks[bit], Const(1) << to, 0))
-                m.d.sync += [marks.eq(0), settling.eq(design.settle_clocks)]
-                m.next = "SETTLE"
-            with m.State("SETTLE"):
-                m.d.sync += settling.eq(settling - 1)
-                with m.If(settling == 0):
-                    m.next = "DONE"
-
-            # Samples of the axis may be under way already: the record that counts comes as late as it takes.
-            with m.State("STROBE"), m.If(self.strobe & (self.strobe_axis == asked)):
-                m.next = "STROBED"
-            with m.State("STROBED"):
-                m.d.comb += moments.strobed.eq(1)
-                m.d.sync += settling.eq(design.axes.spec.latency - 1)
-                m.next = "RECORD"
-            with m.State("RECORD"):
-                m.d.sync += settling.eq(settling - settling.any())
-                shows = self.record_valid & (self.record_axis == asked)
-                m.d.comb += moments.recorded.eq(shows & (settling == 0))
-                with m.If(moments.recorded):
-                    m.next = "TURN"
-            with m.State("TURN"):
-                m.d.comb += moments.turned.eq(self.turn_valid & (self.turn_axis == asked))
-                m.d.sync += asks.eq(0)
-                with m.If(moments.turned):
-                    m.next = "DONE"
+                    self._check(m, at, axes, pulses, refuses, cells)
+                    self._begin(m, pulses, axes, walk)
+            self._read(m, at, cells)
+            text = cells.taking["text"]
+            bounds.add_states(m, host, [cells.area.eq(Area.MOST), text.eq(1)], [text.eq(1)])
+            self._write(m, at, axes, cells)
+            self._walk(m, axes, walk, cells)
+            self._give_pulses(m, axes, pulses, walk)
+            self._snapshot(m, axes, walk, cells)
             with m.State("DONE"):
                 m.d.comb += host.done.eq(1)
                 m.next = "IDLE"
         return m
+
+    def _bounds(self, m: Module, at: At, shift: Signal) -> Bounds:
+        """Return the comparison of a bound, which is fetched, with the host's value."""
+        top, tied, difference = ~at.wide | ~at.place[0], Signal(2, init=3), Signal(CELL_BITS + 1)
+        bound, value = (Cat(each[:-1], each[-1] ^ top) for each in (shift, self.host.value))
+        m.d.comb += [difference.eq(bound - value), self.host.data.eq(shift)]
+        return Bounds(top, tied, difference)
+
+    def _give(self, m: Module, word: Register, axis: Value, value: Value) -> None:
+        """Give a word that is whole to its port, or to the axis."""
+        if is_shared(word):
+            m.d.sync += port(self, word.name).eq(value)
+        elif (number := self._design.numbers.get(word.address + 1)) is not None:
+            m.d.sync += [self.word_write.eq(1), self.word_axis.eq(axis), self.word_number.eq(number)]
+            m.d.sync += self.word_value.eq(value)
+
+    def _boot(self, m: Module, cells: Cells, walk: CommitWalk) -> None:
+        """Add the states that write every cell after a reset."""
+        design, step = self._design, walk.step
+        bits = (END - 1).bit_length()
+        with m.State("BOOT"):
+            m.d.comb += cells.text.addr.eq(Cat(step[:bits], Const(Area.RESET, Shape.cast(Area))))
+            m.next = "BOOT_TAKE"
+        with m.State("BOOT_TAKE"):
+            m.d.comb += cells.taking["text"].eq(1)
+            m.next = "BOOT_STORE"
+        with m.State("BOOT_STORE"):
+            begun = step[:bits]
+            once = less(begun, TELEMETRY) | Cat(begun == own for own in sorted(design.own_places)).any()
+            m.d.comb += [cells.write.addr.eq(step), cells.write.en.eq(1)]
+            with m.If(once & step[bits:].any()):
+                m.d.comb += cells.write.data.eq(0)
+            m.d.sync += step.eq(step + 1)
+            m.next = "BOOT"
+            with m.If(step == BANK * design.banks - 1):
+                m.next = "BEGIN"
+        with m.State("BEGIN"), m.If(self.word_ready):
+            m.next = "IDLE"
+
+    def _check(self, m: Module, at: At, axes: Axes, pulses: Pulses, refused: Value, cells: Cells) -> None:
+        """Add the cases of the operations that check."""
+        design, place = self._design, at.place
+        with m.Case(Operation.CHECK_READ):
+            check_read(m, self, ~(at.in_banks | at.in_map | at.in_capture) | at.half, at.in_capture)
+            with m.If(at.is_status):
+                m.d.sync += [axes.asks.eq(1), axes.asked.eq(axes.here)]
+            m.next = "DONE"
+        with m.Case(Operation.CHECK_WRITE):
+            m.d.comb += [cells.area.eq(Area.LEAST), cells.window.eq(0)]
+            word = ~less(place, design.first_pulse) & less(place, design.last_word)
+            live = ~less(place, LIVE) & less(place, design.last_live)
+            own = Cat(place == each for each in sorted(design.own_places)).any() & at.bank.any()
+            pulses.check(m, self.host, ~at.in_banks | ~(word | live) | own | at.half, refused)
+            m.next = "LEAST"
+
+    def _begin(self, m: Module, pulses: Pulses, axes: Axes, walk: CommitWalk) -> None:
+        """Add the cases of the other operations."""
+        with m.Case(Operation.READ):
+            m.next = "READ"
+        with m.Case(Operation.WRITE):
+            m.next = "TAKE"
+            m.d.sync += pulses.marks.eq(pulses.marks | pulses.wanted)
+        with m.Case(Operation.COUNT):
+            m.next = "COUNT"
+        with m.Case(Operation.FINISH):
+            m.d.sync += walk.step.eq(walk.begin)
+            m.next = "DONE"
+            with m.If(pulses.marks.any()):
+                m.next = "WALK"
+        with m.Case(Operation.SNAPSHOT):
+            m.next = "DONE"
+            with m.If(axes.asks):
+                m.next = "STROBE"
+
+    def _read(self, m: Module, at: At, cells: Cells) -> None:
+        """Add the states of a READ."""
+        taking, captures = cells.taking, self._design.registers.capture
+        with m.State("READ"):
+            m.d.comb += [
+                taking["status"].eq(at.is_status),
+                taking["cell"].eq(at.in_banks & ~at.is_status),
+                taking["text"].eq(~at.in_banks),
+            ]
+            m.next = "DONE"
+            if captures:
+                with m.If(self.host.address[15]):
+                    m.next = "READ_CAPTURE"
+        if captures:
+            with m.State("READ_CAPTURE"):
+                m.d.comb += taking["capture"].eq(1)
+                m.next = "DONE"
+
+    def _write(self, m: Module, at: At, axes: Axes, cells: Cells) -> None:
+        """Add the states of a WRITE and of a COUNT."""
+        with m.State("TAKE"):
+            m.d.comb += cells.taking["value"].eq(1)
+            m.d.sync += axes.to.eq(axes.here)
+            # The upper half has been written just before, and is still there.
+            with m.Switch(at.place):
+                for word in self._design.registers.live:
+                    with m.Case(word.address + 1):
+                        self._give(m, word, axes.here, Cat(self.host.value, cells.shift))
+            m.next = "KEEP"
+        with m.State("KEEP"):
+            m.d.comb += cells.write.en.eq(~at.is_pulse)
+            m.next = "DONE"
+        with m.State("COUNT"):
+            m.d.comb += cells.taking["cell"].eq(1)
+            m.next = "COUNTED"
+        with m.State("COUNTED"):
+            m.d.comb += [cells.write.data.eq(cells.shift + 1), cells.write.en.eq(1)]
+            m.next = "DONE"
+
+    def _walk(self, m: Module, axes: Axes, walk: CommitWalk, cells: Cells) -> None:
+        """Add the states of a walk. The high half of a value comes first, and then both are there."""
+        shift, upper, words = cells.shift, cells.upper, self._design.registers.words
+        with m.State("WALK"):
+            m.d.comb += cells.cell.addr.eq(Cat(walk.place, axes.to))
+            m.next = "WALKED"
+        with m.State("WALKED"):
+            m.d.comb += cells.taking["cell"].eq(1)
+            m.next = "WALK_STORE"
+        with m.State("WALK_STORE"):
+            m.d.comb += [cells.write.addr.eq(Cat(walk.place ^ (ACTIVE ^ WRITTEN), axes.to))]
+            m.d.comb += cells.write.en.eq(walk.copies)
+            m.d.sync += [walk.low.eq(~walk.low), walk.step.eq(walk.step + walk.low)]
+            m.next = "WALK"
+            with m.If(walk.low), m.Switch(walk.step):
+                for number, word in enumerate(words):
+                    with m.Case(number):
+                        self._give(m, word, axes.to, Cat(shift, upper))
+                with m.Case(len(words)):
+                    m.d.sync += self.preload_count.eq(Cat(shift, upper))
+                with m.Case(len(words) + 1):
+                    m.d.sync += [self.acknowledged.eq(Cat(shift, upper)), walk.step.eq(0)]
+                    m.next = "PULSE"
+
+    def _give_pulses(self, m: Module, axes: Axes, pulses: Pulses, walk: CommitWalk) -> None:
+        """Add the states that give the pulses, and wait until they have acted."""
+        with m.State("PULSE"):
+            # One of all axes has a single bit, which is that of the only bank that it is written to in.
+            for bit, name in enumerate(pulses.names):
+                m.d.sync += port(self, name).eq(Mux(pulses.marks[bit], Const(1) << axes.to, 0))
+            m.d.sync += [pulses.marks.eq(0), walk.settling.eq(self._design.settle_clocks)]
+            m.next = "SETTLE"
+        with m.State("SETTLE"):
+            m.d.sync += walk.settling.eq(walk.settling - 1)
+            with m.If(walk.settling == 0):
+                m.next = "DONE"
+
+    def _snapshot(self, m: Module, axes: Axes, walk: CommitWalk, cells: Cells) -> None:
+        """Add the states of a SNAPSHOT.
+
+        Samples of the axis may be under way already: the record that counts comes as late as it takes.
+        """
+        asked, moments, settling = axes.asked, cells.moments, walk.settling
+        with m.State("STROBE"), m.If(self.strobe & (self.strobe_axis == asked)):
+            m.next = "STROBED"
+        with m.State("STROBED"):
+            m.d.comb += moments.strobed.eq(1)
+            m.d.sync += settling.eq(self._design.axes.spec.latency - 1)
+            m.next = "RECORD"
+        with m.State("RECORD"):
+            m.d.sync += settling.eq(settling - settling.any())
+            shows = self.record_valid & (self.record_axis == asked)
+            m.d.comb += moments.recorded.eq(shows & (settling == 0))
+            with m.If(moments.recorded):
+                m.next = "TURN"
+        with m.State("TURN"):
+            m.d.comb += moments.turned.eq(self.turn_valid & (self.turn_axis == asked))
+            m.d.sync += axes.asks.eq(0)
+            with m.If(moments.turned):
+                m.next = "DONE"

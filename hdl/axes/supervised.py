@@ -15,6 +15,7 @@ from hardwall.model.axis.supervisor import CAUSES, COUNT, COUNT_BITS
 from ..arithmetic.fixed import less, shape
 from ..axis.supervised import COMPLEMENTS, LOOPS
 from ..axis.watchdog import Watchdog
+from ..wires import ports
 from . import pending_pulses as gathered
 from .axis import Axes
 from .live_words import LiveWords, Writing
@@ -25,10 +26,6 @@ from .supervisor import Judged, Supervisors, Turn
 
 REQUESTS = "arm", "disarm", "acknowledge"
 """Pulses of the host that wait for an axis's turn."""
-LET = "magnitude", "negative", "armed", "alive", "drive_inverted"
-"""Outputs of the doors."""
-TURN = "state", "ready", "latched", "first", "first_stamp", "counts"
-"""What a turn shows of its supervisor."""
 HIDDEN = "drive", "sampled", "actuated"
 """Outputs of the axes that do not leave: the drive that nobody has let out, and what says when it changed."""
 
@@ -210,16 +207,22 @@ class SupervisedAxes(wiring.Component):
             )
         )
         doors.let_out(judged, self._watchdog.wave, words("drive_invert", end + 2), end + 2)
-        m.d.comb += [getattr(self, name).eq(getattr(doors, name)) for name in LET]
+        m.d.comb += [
+            self.magnitude.eq(doors.magnitude),
+            self.negative.eq(doors.negative),
+            self.armed.eq(doors.armed),
+            self.alive.eq(doors.alive),
+            self.drive_inverted.eq(doors.drive_inverted),
+        ]
         self._show(pipe, judged, pipe.later(idle, 2), end + 2)
         return m
 
     def _levels(self, m: Module) -> dict[str, Signal]:
         """Return the levels of pins as the same edge of the clock has seen them, a bit for each axis."""
         levels = {}
-        for name in ("encoder_a", "encoder_b", *COMPLEMENTS, *LOOPS):
+        for name, pins in ports(self, ("encoder_a", "encoder_b", *COMPLEMENTS, *LOOPS)).items():
             levels[name] = Signal(self._axes.spec.axes, name=f"{name}_levels")
-            m.submodules[f"{name}_synchroniser"] = FFSynchronizer(getattr(self, name), levels[name])
+            m.submodules[f"{name}_synchroniser"] = FFSynchronizer(pins, levels[name])
         return levels
 
     def _connect(self, m: Module, enable: Value) -> None:
@@ -228,12 +231,12 @@ class SupervisedAxes(wiring.Component):
         known = self._design.spec.design.words
         fixed = [number for number, word in enumerate(known) if word.name in FIXED]
         theirs = (self.word_number < len(known)) & ~Cat(self.word_number == number for number in fixed).any()
-        for name, member in axes.signature.members.items():
-            if member.flow == Out and name not in HIDDEN:
-                m.d.comb += getattr(self, name).eq(getattr(axes, name))
-            elif member.flow == In and name not in ("drive_enable", "word_write", "slip"):
-                mine = Value.cast(getattr(self, name))
-                m.d.comb += getattr(axes, name).eq(mine[: len(Value.cast(getattr(axes, name)))])
+        ours, members = ports(self), axes.signature.members
+        for name, its in ports(axes).items():
+            if members[name].flow == Out and name not in HIDDEN:
+                m.d.comb += ours[name].eq(its)
+            elif members[name].flow == In and name not in ("drive_enable", "word_write", "slip"):
+                m.d.comb += its.eq(Value.cast(ours[name])[: len(Value.cast(its))])
         m.d.comb += [
             axes.drive_enable.eq(enable),
             axes.word_write.eq(self.word_write & theirs),
@@ -256,5 +259,10 @@ class SupervisedAxes(wiring.Component):
             self.turn_valid.eq(pipe.valid(stage)),
             self.turn_axis.eq(pipe.axis(stage)),
             self.turn_a_channel_idle.eq(idle),
-            *(getattr(self, f"turn_{name}").eq(getattr(judged, name)) for name in TURN),
+            self.turn_state.eq(judged.state),
+            self.turn_ready.eq(judged.ready),
+            self.turn_latched.eq(judged.latched),
+            self.turn_first.eq(judged.first),
+            self.turn_first_stamp.eq(judged.first_stamp),
+            self.turn_counts.eq(judged.counts),
         ]

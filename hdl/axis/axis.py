@@ -2,7 +2,7 @@
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, signed
 from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import Component, In, Out
 
 from hardwall.model.axis.design import ENCODER_FLAGS, GLITCH_WIDTH, ILLEGAL_WIDTH
 from hardwall.model.spec import AxisSpec
@@ -10,12 +10,13 @@ from hardwall.model.spec import AxisSpec
 from ..arithmetic.fixed import shape
 from ..encoder.quadrature import Quadrature
 from ..estimators.registry import block_of
+from ..wires import given, names_of, ports
 from .output import Output
 from .passivity import Passivity
 from .wall import Wall
 
 
-class Axis(wiring.Component):
+class Axis(Component):
     """An axis from encoder pins to drive: decoder, velocity estimator, wall, passivity if it is so made, output stage.
 
     Every `spec.clocks_per_sample` clocks a strobe takes the count; `latency` clocks later the drive has changed. The
@@ -167,7 +168,7 @@ class Axis(wiring.Component):
 
         active = self._active(m, strobe, estimator.valid)
         for block in (estimator, wall, output):
-            m.d.comb += [getattr(block, word.name).eq(active[word.name]) for word in block.design.words]
+            m.d.comb += given(block, {name: active[name] for name in names_of(block.design.words)})
 
         # A preload or a shift of the origin changes the count without a motion.
         restart = Signal()
@@ -210,6 +211,39 @@ class Axis(wiring.Component):
             wall.velocity.eq(estimator.velocity),
             output.fault.eq(fault),
             output.enable.eq(self.drive_enable),
+        ]
+        self._show(m, decoder, estimator, wall, output)
+
+        force, forced, acts = wall.force, wall.valid, Const(0, 0)
+        if design.passivity is not None:
+            m.submodules.passivity = passivity = Passivity(design.passivity)
+            m.d.comb += given(passivity, {name: active[name] for name in names_of(design.passivity.words)})
+            m.d.comb += [
+                passivity.lead.eq(strobe),
+                passivity.count.eq(decoder.seen.count),
+                passivity.restart.eq(restart),
+                passivity.strobe.eq(estimator.valid),
+                passivity.velocity.eq(estimator.velocity),
+                passivity.drive.eq(output.drive),
+                passivity.forced.eq(wall.valid),
+                passivity.force.eq(wall.force),
+            ]
+            force, forced, acts = passivity.given, passivity.valid, passivity.active
+        m.d.comb += [output.strobe.eq(forced), output.force.eq(force)]
+
+        # A flag is visible from the sample that raised it until it is cleared.
+        raised = Cat(
+            Mux(estimator.valid, Cat(taken_fault, estimator.saturated), 0),
+            Mux(output.valid, Cat(output.limited, acts), 0),
+        )
+        sticky = Signal(len(raised))
+        m.d.sync += sticky.eq(Mux(self.clear_flags, 0, sticky) | raised)
+        m.d.comb += self.flags.eq(sticky | raised)
+        return m
+
+    def _show(self, m: Module, decoder: Quadrature, estimator: Component, wall: Wall, output: Output) -> None:
+        """Give what the blocks show to the outputs."""
+        m.d.comb += [
             self.drive.eq(output.drive),
             self.sampled.eq(output.valid),
             self.actuated.eq(output.actuated),
@@ -237,33 +271,6 @@ class Axis(wiring.Component):
             self.stamp_b_fall.eq(decoder.seen.stamp_b_fall),
         ]
 
-        given, forced, acts = wall.force, wall.valid, Const(0, 0)
-        if design.passivity is not None:
-            m.submodules.passivity = passivity = Passivity(design.passivity)
-            m.d.comb += [getattr(passivity, word.name).eq(active[word.name]) for word in design.passivity.words]
-            m.d.comb += [
-                passivity.lead.eq(strobe),
-                passivity.count.eq(decoder.seen.count),
-                passivity.restart.eq(restart),
-                passivity.strobe.eq(estimator.valid),
-                passivity.velocity.eq(estimator.velocity),
-                passivity.drive.eq(output.drive),
-                passivity.forced.eq(wall.valid),
-                passivity.force.eq(wall.force),
-            ]
-            given, forced, acts = passivity.given, passivity.valid, passivity.active
-        m.d.comb += [output.strobe.eq(forced), output.force.eq(given)]
-
-        # A flag is visible from the sample that raised it until it is cleared.
-        raised = Cat(
-            Mux(estimator.valid, Cat(taken_fault, estimator.saturated), 0),
-            Mux(output.valid, Cat(output.limited, acts), 0),
-        )
-        sticky = Signal(len(raised))
-        m.d.sync += sticky.eq(Mux(self.clear_flags, 0, sticky) | raised)
-        m.d.comb += self.flags.eq(sticky | raised)
-        return m
-
     def _active(self, m: Module, strobe: Signal, estimated: Signal) -> dict[str, Signal]:
         """Return the words in use by name: they wait at the inputs, and take effect together from a sample on."""
         design, pending = self._spec.design, self.commit_pending
@@ -277,8 +284,9 @@ class Axis(wiring.Component):
             begun.eq(Mux(begun, ~estimated, strobe & pending)),
             pending.eq(self.commit | (pending & ~(begun & estimated))),
         ]
+        waiting = ports(self, active)
         with m.If(strobe & pending):
-            m.d.sync += [signal.eq(getattr(self, name)) for name, signal in active.items() if name not in late]
+            m.d.sync += [signal.eq(waiting[name]) for name, signal in active.items() if name not in late]
         with m.If(begun & estimated):
-            m.d.sync += [signal.eq(getattr(self, name)) for name, signal in active.items() if name in late]
+            m.d.sync += [signal.eq(waiting[name]) for name, signal in active.items() if name in late]
         return active

@@ -15,6 +15,7 @@ from ..board.lead_out import lead_out
 from ..drive.registry import block_of
 from ..link.axi_link import AxiLink
 from ..link.link import Link
+from ..wires import given, names_of, port, ports
 from .capture import Capture
 from .supervised import COMPLEMENTS, LOOPS, SupervisedAxis
 
@@ -145,20 +146,20 @@ class Board(wiring.Component):
         m.d.comb += lead_out(link, self, link.PINS)
 
         registers = self.registers
-        has = {name: getattr(axis, name) for name in axis.signature.members}
+        has = ports(axis)
         if self.capture:
             m.submodules.capture = capture = self.capture
             m.d.comb += [
-                *(getattr(capture, name).eq(has[name]) for name in CAPTURED),
+                *given(capture, ports(axis, CAPTURED)),
                 capture.count.eq(axis.sampled_count),
                 capture.velocity.eq(axis.velocity >> len(axis.velocity) - len(capture.velocity)),
                 capture.address.eq(link.capture_address),
                 link.capture_data.eq(capture.data),
                 link.capture_done.eq(capture.done),
             ]
-            has |= {name: getattr(capture, name) for name in capture.signature.members if name.startswith("capture_")}
-        for asked in (*registers.words, *registers.live, *registers.pulses):
-            m.d.comb += has[asked.name].eq(getattr(link, asked.name))
+            has |= {name: shown for name, shown in ports(capture).items() if name.startswith("capture_")}
+        asked = ports(link, names_of((*registers.words, *registers.live, *registers.pulses)))
+        m.d.comb += [has[name].eq(value) for name, value in asked.items()]
         parts = {
             f"counts_{k}": axis.counts.word_select(k, VALUE_BITS) for k in range(-(-len(axis.counts) // VALUE_BITS))
         }
@@ -168,7 +169,7 @@ class Board(wiring.Component):
                 continue
             # A value that is wider than its register gives the upper bits.
             value = parts[shown.name] if shown.name in parts else has[shown.name]
-            m.d.comb += getattr(link, shown.name).eq(value >> max(len(value) - shown.format.width, 0))
+            m.d.comb += port(link, shown.name).eq(value >> max(len(value) - shown.format.width, 0))
         armed = axis.state == ARMED
         refused = {"arm": ~axis.ready, "preload": armed, "origin_shift": armed}
         # At most two samples of the old count, or of the old words, are under way, so the drive of the third actuation
@@ -195,7 +196,7 @@ class Board(wiring.Component):
         m.submodules.stage = stage
         # The strobe comes with the drive that the supervisor has let out, a clock after the axis's.
         actuated = Signal()
-        given = {
+        taken = {
             "strobe": actuated,
             "magnitude": axis.magnitude,
             "negative": axis.negative ^ axis.drive_inverted,
@@ -204,5 +205,5 @@ class Board(wiring.Component):
         }
         if "strobe" in stage.signature.members:
             m.d.sync += actuated.eq(axis.actuated)
-        m.d.comb += [getattr(stage, name).eq(value) for name, value in given.items() if name in stage.signature.members]
+        m.d.comb += given(stage, {name: value for name, value in taken.items() if name in stage.signature.members})
         m.d.comb += lead_out(stage, self, stage.design.pins)

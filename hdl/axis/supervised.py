@@ -10,6 +10,7 @@ from hardwall.model.axis.supervisor import ARMED, CAUSES
 from hardwall.model.spec import AxisSpec
 
 from ..arithmetic.fixed import less, shape
+from ..wires import given, names_of, ports
 from .axis import Axis
 from .monitors import Monitors
 from .supervisor import Supervisor
@@ -108,19 +109,20 @@ class SupervisedAxis(wiring.Component):
 
         levels = {}
         # A channel and its complement are compared as the same edge of the clock has seen them.
-        for name in ("encoder_a", "encoder_b", *COMPLEMENTS, *LOOPS):
+        for name, pin in ports(self, ("encoder_a", "encoder_b", *COMPLEMENTS, *LOOPS)).items():
             levels[name] = Signal(name=f"{name}_level")
-            m.submodules[f"{name}_synchroniser"] = FFSynchronizer(getattr(self, name), levels[name])
+            m.submodules[f"{name}_synchroniser"] = FFSynchronizer(pin, levels[name])
 
-        for name, member in axis.signature.members.items():
-            if member.flow == Out:
-                m.d.comb += getattr(self, name).eq(getattr(axis, name))
+        ours = ports(self)
+        for name, its in ports(axis).items():
+            if axis.signature.members[name].flow == Out:
+                m.d.comb += ours[name].eq(its)
             elif name == "drive_enable":
-                m.d.comb += axis.drive_enable.eq(levels[name])
+                m.d.comb += its.eq(levels[name])
             elif name not in (*FIXED, "slip"):
-                m.d.comb += getattr(axis, name).eq(getattr(self, name))
+                m.d.comb += its.eq(ours[name])
         fixed = {word.name: word.format.max for word in self._design.spec.design.words if word.name in FIXED}
-        m.d.comb += [getattr(axis, name).eq(word) for name, word in fixed.items()]
+        m.d.comb += given(axis, fixed)
 
         m.d.comb += [
             monitors.count.eq(axis.count),
@@ -142,7 +144,7 @@ class SupervisedAxis(wiring.Component):
 
         beyond = []
         for name, (least, most) in self._design.ranges.items():
-            word = getattr(self, name)
+            word = ours[name]
             beyond += [less(word, least), ~less(word, most + 1)]
         outside = {
             "encoder_illegal": axis.illegal,
@@ -168,12 +170,10 @@ class SupervisedAxis(wiring.Component):
         turned = self.commit & (self.encoder_invert ^ inverted)
         slips = Cat(monitors.causes[bit] & self.supervisor_causes[bit] for bit in SLIPS)
         m.d.comb += axis.slip.eq(self.slip | turned | slips.any())
-        for name in REQUESTS:
-            asked = getattr(self, name)
-            m.d.comb += getattr(supervisor, name).eq(asked | turned if name == "disarm" else asked)
+        m.d.comb += given(supervisor, ports(self, REQUESTS) | {"disarm": self.disarm | turned})
         for block in (supervisor, monitors):
-            m.d.comb += [getattr(block, word.name).eq(getattr(self, word.name)) for word in block.design.words]
-        m.d.comb += [getattr(self, name).eq(getattr(supervisor, name)) for name in SHOWN]
+            m.d.comb += given(block, ports(self, names_of(block.design.words)))
+        m.d.comb += given(self, ports(supervisor, SHOWN))
         with m.If(self.state != ARMED):
             m.d.sync += self.drive_inverted.eq(self.drive_invert)
         return m

@@ -73,17 +73,13 @@ class Pwm(Block):
         with m.If(~self.armed):
             m.d.sync += width.eq(0)
         m.d.comb += on.eq(width.any() & (phase < width + dead))
-        self._leg(m, "a", on & ~negative)
-        self._leg(m, "b", on & negative)
+        self._leg(m, "a", on & ~negative, (self.gate_high_a, self.gate_low_a))
+        self._leg(m, "b", on & negative, (self.gate_high_b, self.gate_low_b))
         return m
 
-    def _leg(self, m: Module, name: str, wanted: Value) -> None:
+    def _leg(self, m: Module, name: str, wanted: Value, pins: tuple[Signal, Signal]) -> None:
         """Describe a leg, whose high gate is wanted on, or else its low one."""
-        dead, high_pin, low_pin = (
-            self._design.dead,
-            getattr(self, f"gate_high_{name}"),
-            getattr(self, f"gate_low_{name}"),
-        )
+        dead, (high_pin, low_pin) = self._design.dead, pins
         # A reset, too, is followed by a dead time.
         side, left = Signal(name=f"{name}_side"), Signal(range(dead + 1), init=dead, name=f"{name}_left")
         high, low = Signal(name=f"{name}_high"), Signal(name=f"{name}_low")

@@ -6,6 +6,7 @@ from hardwall.model.estimators.levant_semi_implicit import Design
 
 from ..arithmetic.fixed import saturate, shape, shift_floor, shift_round_half_up
 from ..arithmetic.sqrt import Sqrt
+from ..wires import port
 from .estimate import EstimatorBlock
 from .levant import arrive, distance_of, magnitude
 
@@ -42,7 +43,7 @@ class Estimator(EstimatorBlock):
 
     def _word(self, number: int) -> Value:
         """Return a run-time word: 0 for lambda, 1 for alpha, 2 for the output."""
-        return getattr(self, self.design.words[number].name)
+        return port(self, self.design.words[number].name)
 
     def _alpha(self) -> Value:
         """Return alpha, valid from state BAND on."""

@@ -13,6 +13,7 @@ from hardwall.model.axis.supervisor import COUNT, COUNT_BITS
 from hardwall.model.register import VALUE_BITS
 
 from ..arithmetic.fixed import shape
+from ..wires import ports
 
 RECORD = "count", "velocity", "wall_force", "drive", "flags"
 """What the axes show of a sample, behind `record_`."""
@@ -86,16 +87,17 @@ def _taken(m: Module, file: wiring.Component, asked: Signal) -> tuple[dict[str, 
     """Return the status of an axis by name: what comes with its strobe, with its record, and with its turn."""
     registers, banks = file.design.registers, file.design.banks
     strobed = {name: word_of(stamps, asked, banks) for name, stamps in _edge_stamps(m, file).items()}
-    record = {name: getattr(file, f"record_{name}") for name in RECORD}
-    record |= {name: word_of(getattr(file, name), asked, banks) for name in WITH_RECORD}
+    seen = ports(file)
+    record = {name: seen[f"record_{name}"] for name in RECORD}
+    record |= {name: word_of(seen[name], asked, banks) for name in WITH_RECORD}
     record["velocity"] >>= max(len(file.record_velocity) - registers["velocity"].format.width, 0)
-    turn = {name: getattr(file, f"turn_{name}") for name in TURN if name != "counts"}
+    turn = {name: seen[f"turn_{name}"] for name in TURN if name != "counts"}
     values = range(-(-len(file.turn_counts) // VALUE_BITS))
     turn |= {f"counts_{value}": file.turn_counts.word_select(value, VALUE_BITS) for value in values}
-    magnitude, negative = (word_of(getattr(file, name), asked, banks) for name in ("magnitude", "negative"))
+    magnitude, negative = (word_of(each, asked, banks) for each in (file.magnitude, file.negative))
     turn |= {"driven": Mux(negative, -magnitude, magnitude), "live": file.live}
     turn |= {"referenced": word_of(file.referenced, asked, banks)}
-    turn |= {name: getattr(file, name) for name in captured(file.design)}
+    turn |= ports(file, captured(file.design))
     return strobed, record | {"stamp": file.stamp}, turn
 
 

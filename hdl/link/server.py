@@ -1,23 +1,19 @@
 """The application layer of Modbus: functions and exceptions over a register file."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal
+from amaranth.hdl import Cat, Module, Mux
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.utils import exact_log2
 
 from hardwall.model.axis.register_file import ANSWER, ANSWERS, CELL_BITS, Design, Operation
-from hardwall.model.axis.registers import COUNTERS
 from hardwall.model.link import server as model
 from hardwall.model.link.line import Verdict
 
 from ..arithmetic.fixed import less
 from .line import BYTE, Frames
 from .requests import ADDRESS_BITS, Requests
+from .walk import ECHOED, HEAD, HEAD_OF_OTHERS, Walk
 
-FIELDS, FIELDS_TO_WRITE = 2, 6
-"""Places in a request: of its first field, and of the first field of the registers to write if it reads as well."""
-HEAD, HEAD_OF_OTHERS, ECHOED = 2, 4, 6
-"""Bytes of a request that its answer begins with: of a read, of diagnostics and identification, and of a write."""
 COUNTERS_CLEARED = 8
 
 
@@ -67,280 +63,232 @@ class Server(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        frames, file, answer = self.frames, self.file, self.frames.answer
-        function, answers = frames.function, self._design.answers_at
-        reads, writes, single = Signal(), Signal(), Signal()
-        m.d.comb += [
-            reads.eq(Cat(function == each for each in model.READS).any()),
-            writes.eq(Cat(function == each for each in model.WRITES).any()),
-            single.eq(function == model.WRITE_ONE),
-        ]
-
-        # A byte of the frame comes a clock after its `index`, and is looked at a clock later: a memory is slow.
-        index, beat = Signal(BYTE), Signal(2)
-        word, length = Signal(CELL_BITS), Signal(BYTE)
-        taking, got, ending, excepting = Signal(), Signal(), Signal(), Signal()
-        with m.If(taking | got | ending):
-            taken = Cat(frames.byte, word[:BYTE])
-            m.d.sync += word.eq(Mux(got, file.data, Cat(taken[:BYTE], Mux(ending, length, taken[BYTE:]))))
-        # What `index` becomes is the next place, or one of three.
-        advance, rewind, at_fields, at_written = Signal(), Signal(), Signal(), Signal()
-        m.d.comb += frames.index.eq(index)
-        with m.If(advance | rewind | at_fields | at_written):
-            begin = Mux(at_written, FIELDS_TO_WRITE, Mux(at_fields, FIELDS, 0))
-            m.d.sync += index.eq(Mux(advance, index + 1, begin))
-
-        def take(last: int):
-            """Take two bytes, which are in the word at beat 3, or one, which is in its lower half at beat 2."""
-            m.d.comb += taking.eq(beat[0] ^ beat[1])
-            m.d.sync += beat.eq(beat + 1)
-            with m.If(beat < last - 1):
-                m.d.comb += advance.eq(1)
-            with m.If(beat == last):
-                m.d.sync += beat.eq(0)
-
-        phase = Signal(Operation)
-        address, left, first = Signal(ADDRESS_BITS), Signal(BYTE), Signal()
-        malformed, clearing = Signal(), Signal()
-        code, stop = Signal(range(model.FAILURE + 1)), Signal(range(ECHOED + 1))
-        m.d.comb += [
-            file.operation.eq(phase),
-            file.address.eq(address),
-            file.first.eq(first),
-            file.last.eq(left == 1),
-            file.value.eq(word),
-            length.eq(Mux(code == 0, left << 1, code)),
-            answer.payload.eq(Cat(word[BYTE:-1], word[-1] | excepting)),
-        ]
-        few, fewer, fewest = (
-            less(word, most + 1) for most in (model.READ_MAX, model.WRITE_MAX, model.WRITE_AND_READ_MAX)
-        )
-        bad = ~word.any() | ~Mux(writes & phase[0], Mux(reads, fewest, fewer), few)
-
-        # What `address` and `left` become: those of the next register, of a request, or of this device's own.
-        onward, address_given, left_given, own_address, own_left = Signal(), Signal(), Signal(), Signal(), Signal()
-        counter, place, size = Signal(3), Signal(ADDRESS_BITS), Signal(BYTE)
-        m.d.comb += [place.eq(COUNTERS | counter), size.eq(1)]
-        with m.If(onward | address_given | own_address):
-            m.d.sync += address.eq(Mux(onward, address + 1, Mux(address_given, word, place)))
-        with m.If(onward | left_given | own_left):
-            m.d.sync += left.eq(Mux(onward, left - 1, Mux(left_given, word, size)))
-
-        def count(number: int):
-            m.d.comb += [own_address.eq(1), counter.eq(number)]
-            m.next = "COUNT"
-
-        def refuse(exception: int):
-            m.d.sync += code.eq(exception)
-            count(model.EXCEPTIONS)
-
-        def send_head(length: int):
-            """Send the first bytes of the frame, and then what belongs behind them."""
-            m.d.comb += rewind.eq(1)
-            m.d.sync += stop.eq(length)
-            m.next = "HEAD"
-
-        def end_phase():
-            m.d.sync += phase.eq(phase + 1)
-            m.next = "PHASE"
-
+        walk = Walk(m, self.frames, self.file)
         with m.FSM():
-            with m.State("IDLE"):
-                m.d.sync += [code.eq(0), clearing.eq(0), malformed.eq(0), beat.eq(0), phase.eq(Operation.CHECK_READ)]
-                with m.If(frames.ended), m.Switch(frames.verdict):
-                    with m.Case(Verdict.SPOILT):
-                        count(model.ERRORS)
-                    with m.Case(Verdict.OVERRUN):
-                        count(model.OVERRUNS)
-                    with m.Default():
-                        count(model.MESSAGES)
-            with m.State("COUNT"):
-                m.d.comb += [file.start.eq(1), file.clear.eq(1), file.operation.eq(Operation.COUNT)]
-                with m.If(file.done):
-                    m.next = "FINISHED"
-                    with m.Switch(address[:3]):
-                        with m.Case(model.MESSAGES):
-                            with m.If(frames.verdict == Verdict.REQUEST):
-                                count(model.REQUESTS)
-                            with m.Elif(frames.verdict == Verdict.BROADCAST):
-                                count(model.UNANSWERED)
-                        with m.Case(model.REQUESTS):
-                            m.d.comb += at_fields.eq(1)
-                            m.next = "PHASE"
-                            with m.If((function == model.DIAGNOSE) | (function == model.IDENTIFY)):
-                                m.next = "ADDRESS"
-                            with m.Elif(~reads & ~writes):
-                                refuse(model.FUNCTION)
-                        with m.Case(model.EXCEPTIONS):
-                            send_head(HEAD)
-
-            # What a frame that reads or writes goes through: check the registers to read, check those to write, write,
-            # read.
-            with m.State("PHASE"), m.Switch(phase):
-                with m.Case(Operation.CHECK_READ):
-                    m.next = "ADDRESS"
-                    with m.If(~reads):
-                        end_phase()
-                with m.Case(Operation.CHECK_WRITE):
-                    m.d.comb += [at_written.eq(reads), at_fields.eq(1)]
-                    m.next = "ADDRESS"
-                    with m.If(~writes):
-                        end_phase()
-                with m.Case(Operation.WRITE):
-                    m.d.comb += [at_written.eq(reads), at_fields.eq(1)]
-                    m.next = "ADDRESS"
-                    with m.If(~writes):
-                        end_phase()
-                    with m.If(file.refused):
-                        refuse(model.FAILURE)
-                    with m.If(file.outside):
-                        refuse(model.VALUE)
-                    with m.If(file.absent):
-                        refuse(model.ABSENT)
-                    with m.If(malformed):
-                        refuse(model.VALUE)
-                with m.Case(Operation.READ):
-                    m.next = "SNAPSHOT"
-                    with m.If(~reads):
-                        send_head(ECHOED)
-            with m.State("SNAPSHOT"):
-                m.d.comb += [file.start.eq(1), file.operation.eq(Operation.SNAPSHOT), at_fields.eq(1)]
-                with m.If(file.done):
-                    m.next = "ADDRESS"
-            with m.State("ADDRESS"):
-                take(3)
-                m.d.sync += first.eq(1)
-                with m.If(beat == 3):
-                    m.d.comb += [address_given.eq(1), own_left.eq(1)]
-                    m.next = "QUANTITY"
-                    with m.If(single):
-                        m.next = "VALUE"
-                    with m.Elif(function == model.IDENTIFY):
-                        m.next = "IDENTIFY"
-            with m.State("QUANTITY"):
-                take(3)
-                with m.If(beat == 3):
-                    m.d.comb += left_given.eq(1)
-                    with m.If(function == model.DIAGNOSE):
-                        m.next = "DIAGNOSE"
-                    with m.Elif(phase[0] == phase[1]):
-                        # To read: check first, or send the head.
-                        m.next = "ASK"
-                        with m.If(phase[0]):
-                            send_head(HEAD)
-                        with m.Elif(bad):
-                            m.d.sync += malformed.eq(1)
-                            end_phase()
-                    with m.Else():
-                        m.d.sync += malformed.eq(malformed | bad)
-                        m.next = "BYTES"
-            with m.State("BYTES"):
-                take(2)
-                with m.If(beat == 2):
-                    m.next = "VALUE"
-                    with m.If(malformed | (word[:BYTE] != left << 1)):
-                        m.d.sync += malformed.eq(1)
-                        end_phase()
-            with m.State("VALUE"):
-                take(3)
-                with m.If(beat == 3):
-                    m.next = "ASK"
-
-            # A register.
-            with m.State("ASK"):
-                m.d.comb += file.start.eq(1)
-                with m.If(file.done):
-                    m.next = "NEXT"
-                    with m.If(phase == Operation.READ):
-                        m.d.comb += got.eq(1)
-                        m.next = "SEND_HIGH"
-            with m.State("NEXT"):
-                m.d.comb += onward.eq(1)
-                m.d.sync += first.eq(0)
-                m.next = "ASK"
-                with m.If(left == 1):
-                    end_phase()
-                    with m.If(phase == Operation.READ):
-                        m.next = "FINISHED"
-                    with m.Elif(phase == Operation.WRITE):
-                        m.next = "FINISH"
-                with m.Elif((phase[0] ^ phase[1]) & ~clearing):
-                    m.next = "VALUE"
-            with m.State("FINISH"):
-                m.d.comb += [file.start.eq(1), file.operation.eq(Operation.FINISH)]
-                with m.If(file.done):
-                    m.next = "PHASE"
-
-            # The other functions: their first word is at `address`.
-            with m.State("DIAGNOSE"):
-                sub = address[: ADDRESS_BITS - 1]
-                m.d.sync += phase.eq(Operation.READ)
-                with m.If(sub == model.ECHO):
-                    send_head(ECHOED)
-                with m.Elif(less(sub, model.CLEAR) | ~less(sub, model.LAST_COUNTER + 1)):
-                    refuse(model.FUNCTION)
-                with m.Elif(word != 0):
-                    refuse(model.VALUE)
-                with m.Elif(sub == model.CLEAR):
-                    m.d.comb += [own_address.eq(1), own_left.eq(1), size.eq(COUNTERS_CLEARED)]
-                    m.d.sync += [phase.eq(Operation.WRITE), clearing.eq(1)]
-                    m.next = "ASK"
-                with m.Else():
-                    m.d.comb += [own_address.eq(1), counter.eq(sub), own_left.eq(1)]
-                    send_head(HEAD_OF_OTHERS)
-            with m.State("IDENTIFY"):
-                # The first word has the kind, which is 14, and the code; then the number of the object comes.
-                take(2)
-                m.d.sync += phase.eq(Operation.READ)
-                with m.If(beat == 2):
-                    kind, asked, number_asked = address[BYTE:CELL_BITS], address[:BYTE], word[:BYTE]
-                    named, known = asked == model.NAMED, less(number_asked, len(answers) // 2)
-                    with m.If(kind != model.DEVICE_IDENTIFICATION):
-                        refuse(model.FUNCTION)
-                    with m.Elif(~asked.any() | ~less(asked, model.NAMED + 1)):
-                        refuse(model.VALUE)
-                    with m.Elif(named & ~known):
-                        refuse(model.ABSENT)
-                    with m.Else():
-                        send_head(HEAD_OF_OTHERS)
-                        # A number that is not known begins a stream at the first object.
-                        chosen = Cat(Mux(known, number_asked[: exact_log2(ANSWERS)], 0), named)
-                        m.d.comb += [own_address.eq(1), own_left.eq(1)]
-                        m.d.comb += place.eq(answers[False, 0][0] | chosen << exact_log2(ANSWER))
-                        with m.Switch(chosen):
-                            for (one, number), (_, registers) in answers.items():
-                                with m.Case(one * ANSWERS + number):
-                                    m.d.comb += size.eq(registers)
-
-            # The answer.
-            with m.State("HEAD"):
-                # The byte is taken twice, and so into the upper half.
-                m.d.comb += [taking.eq(beat[0] ^ beat[1]), answer.valid.eq(beat == 3)]
-                m.d.comb += excepting.eq((code != 0) & index[0])
-                with m.If(beat != 3):
-                    m.d.sync += beat.eq(beat + 1)
-                with m.Elif(answer.ready):
-                    m.d.comb += advance.eq(1)
-                    m.d.sync += beat.eq(0)
-                    with m.If((index + 1)[: len(stop)] == stop):
-                        m.d.comb += ending.eq(1)
-                        with m.Switch(stop):
-                            with m.Case(HEAD):
-                                m.next = "SEND_LAST"
-                            with m.Case(HEAD_OF_OTHERS):
-                                m.next = "ASK"
-                            with m.Default():
-                                m.next = "FINISHED"
-            for state in ("SEND_LAST", "SEND_HIGH", "SEND_LOW"):
-                with m.State(state):
-                    m.d.comb += answer.valid.eq(1)
-                    with m.If(answer.ready):
-                        m.d.comb += taking.eq(1)
-                        m.next = {"SEND_HIGH": "SEND_LOW", "SEND_LOW": "NEXT", "SEND_LAST": "ASK"}[state]
-                        if state == "SEND_LAST":
-                            with m.If(code != 0):
-                                m.next = "FINISHED"
-            with m.State("FINISHED"):
-                m.d.comb += frames.finished.eq(1)
-                m.next = "IDLE"
+            self._count(m, walk)
+            self._begin_phases(m, walk)
+            self._read_fields(m, walk)
+            self._do_registers(m, walk)
+            self._diagnose(m, walk)
+            self._identify(m, walk)
+            self._answer(m, walk)
         return m
+
+    def _count(self, m: Module, walk: Walk) -> None:
+        """Add the states that wait for a frame, and that count it: each count leads to what follows it."""
+        frames, file, function = self.frames, self.file, self.frames.function
+        with m.State("IDLE"):
+            m.d.sync += [walk.code.eq(0), walk.clearing.eq(0), walk.malformed.eq(0), walk.beat.eq(0)]
+            m.d.sync += walk.phase.eq(Operation.CHECK_READ)
+            with m.If(frames.ended), m.Switch(frames.verdict):
+                with m.Case(Verdict.SPOILT):
+                    walk.count(model.ERRORS)
+                with m.Case(Verdict.OVERRUN):
+                    walk.count(model.OVERRUNS)
+                with m.Default():
+                    walk.count(model.MESSAGES)
+        with m.State("COUNT"):
+            m.d.comb += [file.start.eq(1), file.clear.eq(1), file.operation.eq(Operation.COUNT)]
+            with m.If(file.done):
+                m.next = "FINISHED"
+                with m.Switch(walk.address[:3]):
+                    with m.Case(model.MESSAGES):
+                        with m.If(frames.verdict == Verdict.REQUEST):
+                            walk.count(model.REQUESTS)
+                        with m.Elif(frames.verdict == Verdict.BROADCAST):
+                            walk.count(model.UNANSWERED)
+                    with m.Case(model.REQUESTS):
+                        m.d.comb += walk.at_fields.eq(1)
+                        m.next = "PHASE"
+                        with m.If((function == model.DIAGNOSE) | (function == model.IDENTIFY)):
+                            m.next = "ADDRESS"
+                        with m.Elif(~walk.reads & ~walk.writes):
+                            walk.refuse(model.FUNCTION)
+                    with m.Case(model.EXCEPTIONS):
+                        walk.send_head(HEAD)
+
+    def _begin_phases(self, m: Module, walk: Walk) -> None:
+        """Add the state that begins each phase: check the registers to read, those to write, then write, and read."""
+        file = self.file
+        with m.State("PHASE"), m.Switch(walk.phase):
+            with m.Case(Operation.CHECK_READ):
+                m.next = "ADDRESS"
+                with m.If(~walk.reads):
+                    walk.end_phase()
+            with m.Case(Operation.CHECK_WRITE):
+                m.d.comb += [walk.at_written.eq(walk.reads), walk.at_fields.eq(1)]
+                m.next = "ADDRESS"
+                with m.If(~walk.writes):
+                    walk.end_phase()
+            with m.Case(Operation.WRITE):
+                m.d.comb += [walk.at_written.eq(walk.reads), walk.at_fields.eq(1)]
+                m.next = "ADDRESS"
+                with m.If(~walk.writes):
+                    walk.end_phase()
+                with m.If(file.refused):
+                    walk.refuse(model.FAILURE)
+                with m.If(file.outside):
+                    walk.refuse(model.VALUE)
+                with m.If(file.absent):
+                    walk.refuse(model.ABSENT)
+                with m.If(walk.malformed):
+                    walk.refuse(model.VALUE)
+            with m.Case(Operation.READ):
+                m.next = "SNAPSHOT"
+                with m.If(~walk.reads):
+                    walk.send_head(ECHOED)
+
+    def _read_fields(self, m: Module, walk: Walk) -> None:
+        """Add the states that take the fields of a request, up to the first value, for each phase anew."""
+        file, function = self.file, self.frames.function
+        with m.State("SNAPSHOT"):
+            m.d.comb += [file.start.eq(1), file.operation.eq(Operation.SNAPSHOT), walk.at_fields.eq(1)]
+            with m.If(file.done):
+                m.next = "ADDRESS"
+        with m.State("ADDRESS"):
+            walk.take(3)
+            m.d.sync += walk.first.eq(1)
+            with m.If(walk.beat == 3):
+                m.d.comb += [walk.address_given.eq(1), walk.own_left.eq(1)]
+                m.next = "QUANTITY"
+                with m.If(walk.single):
+                    m.next = "VALUE"
+                with m.Elif(function == model.IDENTIFY):
+                    m.next = "IDENTIFY"
+        with m.State("QUANTITY"):
+            walk.take(3)
+            with m.If(walk.beat == 3):
+                m.d.comb += walk.left_given.eq(1)
+                with m.If(function == model.DIAGNOSE):
+                    m.next = "DIAGNOSE"
+                with m.Elif(walk.phase[0] == walk.phase[1]):
+                    # To read: check first, or send the head.
+                    m.next = "ASK"
+                    with m.If(walk.phase[0]):
+                        walk.send_head(HEAD)
+                    with m.Elif(walk.bad):
+                        m.d.sync += walk.malformed.eq(1)
+                        walk.end_phase()
+                with m.Else():
+                    m.d.sync += walk.malformed.eq(walk.malformed | walk.bad)
+                    m.next = "BYTES"
+        with m.State("BYTES"):
+            walk.take(2)
+            with m.If(walk.beat == 2):
+                m.next = "VALUE"
+                with m.If(walk.malformed | (walk.word[:BYTE] != walk.left << 1)):
+                    m.d.sync += walk.malformed.eq(1)
+                    walk.end_phase()
+        with m.State("VALUE"):
+            walk.take(3)
+            with m.If(walk.beat == 3):
+                m.next = "ASK"
+
+    def _do_registers(self, m: Module, walk: Walk) -> None:
+        """Add the states that ask the file for a register after the other, and that finish what was written."""
+        file = self.file
+        with m.State("ASK"):
+            m.d.comb += file.start.eq(1)
+            with m.If(file.done):
+                m.next = "NEXT"
+                with m.If(walk.phase == Operation.READ):
+                    m.d.comb += walk.got.eq(1)
+                    m.next = "SEND_HIGH"
+        with m.State("NEXT"):
+            m.d.comb += walk.onward.eq(1)
+            m.d.sync += walk.first.eq(0)
+            m.next = "ASK"
+            with m.If(walk.left == 1):
+                walk.end_phase()
+                with m.If(walk.phase == Operation.READ):
+                    m.next = "FINISHED"
+                with m.Elif(walk.phase == Operation.WRITE):
+                    m.next = "FINISH"
+            with m.Elif((walk.phase[0] ^ walk.phase[1]) & ~walk.clearing):
+                m.next = "VALUE"
+        with m.State("FINISH"):
+            m.d.comb += [file.start.eq(1), file.operation.eq(Operation.FINISH)]
+            with m.If(file.done):
+                m.next = "PHASE"
+
+    def _diagnose(self, m: Module, walk: Walk) -> None:
+        """Add the state of diagnostics: the first word is at `address`."""
+        with m.State("DIAGNOSE"):
+            sub = walk.address[: ADDRESS_BITS - 1]
+            m.d.sync += walk.phase.eq(Operation.READ)
+            with m.If(sub == model.ECHO):
+                walk.send_head(ECHOED)
+            with m.Elif(less(sub, model.CLEAR) | ~less(sub, model.LAST_COUNTER + 1)):
+                walk.refuse(model.FUNCTION)
+            with m.Elif(walk.word != 0):
+                walk.refuse(model.VALUE)
+            with m.Elif(sub == model.CLEAR):
+                m.d.comb += [walk.own_address.eq(1), walk.own_left.eq(1), walk.size.eq(COUNTERS_CLEARED)]
+                m.d.sync += [walk.phase.eq(Operation.WRITE), walk.clearing.eq(1)]
+                m.next = "ASK"
+            with m.Else():
+                m.d.comb += [walk.own_address.eq(1), walk.counter.eq(sub), walk.own_left.eq(1)]
+                walk.send_head(HEAD_OF_OTHERS)
+
+    def _identify(self, m: Module, walk: Walk) -> None:
+        """Add the state of identification.
+
+        The first word, at `address`, has the kind, which is 14, and the code; then the number of the object comes.
+        """
+        answers = self._design.answers_at
+        with m.State("IDENTIFY"):
+            walk.take(2)
+            m.d.sync += walk.phase.eq(Operation.READ)
+            with m.If(walk.beat == 2):
+                kind, asked, number_asked = walk.address[BYTE:CELL_BITS], walk.address[:BYTE], walk.word[:BYTE]
+                named, known = asked == model.NAMED, less(number_asked, len(answers) // 2)
+                with m.If(kind != model.DEVICE_IDENTIFICATION):
+                    walk.refuse(model.FUNCTION)
+                with m.Elif(~asked.any() | ~less(asked, model.NAMED + 1)):
+                    walk.refuse(model.VALUE)
+                with m.Elif(named & ~known):
+                    walk.refuse(model.ABSENT)
+                with m.Else():
+                    walk.send_head(HEAD_OF_OTHERS)
+                    # A number that is not known begins a stream at the first object.
+                    chosen = Cat(Mux(known, number_asked[: exact_log2(ANSWERS)], 0), named)
+                    m.d.comb += [walk.own_address.eq(1), walk.own_left.eq(1)]
+                    m.d.comb += walk.place.eq(answers[False, 0][0] | chosen << exact_log2(ANSWER))
+                    with m.Switch(chosen):
+                        for (one, number), (_, registers) in answers.items():
+                            with m.Case(one * ANSWERS + number):
+                                m.d.comb += walk.size.eq(registers)
+
+    def _answer(self, m: Module, walk: Walk) -> None:
+        """Add the states that send the answer."""
+        frames, answer = self.frames, self.frames.answer
+        with m.State("HEAD"):
+            # The byte is taken twice, and so into the upper half.
+            m.d.comb += [walk.taking.eq(walk.beat[0] ^ walk.beat[1]), answer.valid.eq(walk.beat == 3)]
+            m.d.comb += walk.excepting.eq((walk.code != 0) & walk.index[0])
+            with m.If(walk.beat != 3):
+                m.d.sync += walk.beat.eq(walk.beat + 1)
+            with m.Elif(answer.ready):
+                m.d.comb += walk.advance.eq(1)
+                m.d.sync += walk.beat.eq(0)
+                with m.If((walk.index + 1)[: len(walk.stop)] == walk.stop):
+                    m.d.comb += walk.ending.eq(1)
+                    with m.Switch(walk.stop):
+                        with m.Case(HEAD):
+                            m.next = "SEND_LAST"
+                        with m.Case(HEAD_OF_OTHERS):
+                            m.next = "ASK"
+                        with m.Default():
+                            m.next = "FINISHED"
+        for state in ("SEND_LAST", "SEND_HIGH", "SEND_LOW"):
+            with m.State(state):
+                m.d.comb += answer.valid.eq(1)
+                with m.If(answer.ready):
+                    m.d.comb += walk.taking.eq(1)
+                    m.next = {"SEND_HIGH": "SEND_LOW", "SEND_LOW": "NEXT", "SEND_LAST": "ASK"}[state]
+                    if state == "SEND_LAST":
+                        with m.If(walk.code != 0):
+                            m.next = "FINISHED"
+        with m.State("FINISHED"):
+            m.d.comb += frames.finished.eq(1)
+            m.next = "IDLE"

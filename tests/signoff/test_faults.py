@@ -55,9 +55,7 @@ QUICK_OF_AXES = (
 (AXES,) = (name for name, device in DEVICES.items() if device is SEVERAL)
 NEIGHBOURS = Bug(Doors.__init__, "Cat(each[axis] for", "Cat(each for")
 """Doors of several axes that a loop shuts which is another axis's matter."""
-DEAF = Bug(
-    AxesBoard.elaborate, "getattr(self, name)).replicate(self.spec.axes)", "getattr(self, name)).replicate(2) | 4"
-)
+DEAF = Bug(AxesBoard.elaborate, "loop.replicate(self.spec.axes)", "loop.replicate(2) | 4")
 """A board whose third axis hears of no loop."""
 
 

@@ -15,35 +15,39 @@ class Bug:
         function: the function, mostly the `elaborate` of a block.
         right: a part of its source, which occurs once.
         wrong: what stands in its place.
-        sooner: other parts that occur once, and what stands in their places: no bugs, but it shows sooner with them.
+        sooner: other changes: no bugs, but it shows sooner with them.
     """
 
     function: Callable
     right: str
     wrong: str
-    sooner: tuple[tuple[str, str], ...] = ()
+    sooner: tuple["Bug", ...] = ()
 
     def __str__(self) -> str:
         return f"{self.wrong or 'nothing'} for {self.right}"
 
     @contextmanager
     def seeded(self) -> Iterator[None]:
-        """Let the function have the bug inside the context; its source is not touched.
+        """Let the functions have the changes inside the context; their sources are not touched.
 
         Raises:
-            ValueError: if the source does not have a part exactly once.
+            ValueError: if a source does not have a part exactly once.
         """
-        source = textwrap.dedent(inspect.getsource(self.function))
-        for right, wrong in ((self.right, self.wrong), *self.sooner):
+        sources: dict[Callable, str] = {}
+        for each in (self, *self.sooner):
+            function, right = each.function, each.right
+            source = sources.setdefault(function, textwrap.dedent(inspect.getsource(function)))
             if source.count(right) != 1:
-                raise ValueError(f"{self.function.__qualname__} must have {right!r} once, not {source.count(right)}")
-            source = source.replace(right, wrong)
-        before = self.function.__code__
-        self.function.__code__ = _code(source, before)
+                raise ValueError(f"{function.__qualname__} must have {right!r} once, not {source.count(right)}")
+            sources[function] = source.replace(right, each.wrong)
+        before = {function: function.__code__ for function in sources}
         try:
+            for function, source in sources.items():
+                function.__code__ = _code(source, before[function])
             yield
         finally:
-            self.function.__code__ = before
+            for function, code in before.items():
+                function.__code__ = code
 
 
 def _code(source: str, before):

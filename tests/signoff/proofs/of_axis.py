@@ -63,7 +63,7 @@ def zero_before_a_commit(estimator: str, bench: Bench) -> None:
     bench.promise(axis.drive == 0)
 
 
-PAST_THE_OUTPUT = Bug(Axis.elaborate, "self.drive.eq(output.drive)", "self.drive.eq(decoder.seen.count)")
+PAST_THE_OUTPUT = Bug(Axis._show, "self.drive.eq(output.drive)", "self.drive.eq(decoder.seen.count)")
 
 
 def of(estimator: str, *deep: Bug) -> list[Property]:

@@ -3,7 +3,9 @@
 from amaranth.hdl import Cat, Mux, Signal, Value
 from amaranth.lib.wiring import PureInterface
 
+from hardwall.hdl.axes.commit_walk import CommitWalk
 from hardwall.hdl.axes.register_file import BankedFile
+from hardwall.hdl.link.checks import Pulses
 from hardwall.model.axes.axis import AxesSpec
 from hardwall.model.axes.register_file import Design
 from hardwall.model.axes.registers import BANK, AxesMap, is_shared
@@ -185,7 +187,7 @@ def every_operation_ends(bench: Bench) -> None:
     bench.promise(~bench.past(bench.reset, init=1) | bench.state("BOOT") & (left == block.boot_clocks))
 
 
-NO_BOOT = (('m.next = "BOOT_TAKE"', 'm.next = "IDLE"'),)
+NO_BOOT = (Bug(BankedFile._boot, 'm.next = "BOOT_TAKE"', 'm.next = "IDLE"'),)
 """A reset writes no cell, so that a bug behind it shows in the first clocks."""
 PROPERTIES = [
     Property(
@@ -194,8 +196,8 @@ PROPERTIES = [
         one_frame_arms_or_moves,
         depth=2,
         bugs=(
-            Bug(BankedFile.elaborate, "| several", "", NO_BOOT),
-            Bug(BankedFile.elaborate, "exclusive.eq(after)", "exclusive.eq(0)", NO_BOOT),
+            Bug(BankedFile.elaborate, " | pulses.several", "", NO_BOOT),
+            Bug(Pulses.check, "exclusive.eq(self.after)", "exclusive.eq(0)", NO_BOOT),
         ),
         within=12,
     ),
@@ -205,11 +207,11 @@ PROPERTIES = [
         pulses_are_asked_for,
         depth=2,
         bugs=(
-            Bug(BankedFile.elaborate, "& host.value[0]", "", NO_BOOT),
+            Bug(Pulses.__init__, "& host.value[0]", "", NO_BOOT),
             Bug(
-                BankedFile.elaborate,
-                "Mux(marks[bit], Const(1) << to, 0)",
-                "Mux(marks[bit], Const(1) << here, 0)",
+                BankedFile._give_pulses,
+                "Mux(pulses.marks[bit], Const(1) << axes.to, 0)",
+                "Mux(pulses.marks[bit], Const(1) << axes.here, 0)",
                 NO_BOOT,
             ),
         ),
@@ -221,12 +223,12 @@ PROPERTIES = [
         depth=2,
         bugs=(
             Bug(
-                BankedFile.elaborate,
-                "give(word, to, Cat(shift, upper))",
-                "give(word, asked, Cat(shift, upper))",
+                BankedFile._walk,
+                "word, axes.to, Cat(shift, upper)",
+                "word, axes.asked, Cat(shift, upper)",
                 NO_BOOT,
             ),
-            Bug(BankedFile.elaborate, "Mux(commit, 0, words)", "0", NO_BOOT),
+            Bug(CommitWalk.__init__, "Mux(commit, 0, words)", "0", NO_BOOT),
         ),
     ),
     Property(
@@ -234,7 +236,7 @@ PROPERTIES = [
         WHERE,
         checks_alone_find,
         depth=2,
-        bugs=(Bug(BankedFile.elaborate, "host.absent.eq(0), ", "", NO_BOOT),),
+        bugs=(Bug(Pulses.begin, "host.absent.eq(0), ", "", NO_BOOT),),
         within=12,
     ),
     Property(
@@ -243,9 +245,9 @@ PROPERTIES = [
         every_operation_ends,
         depth=2,
         bugs=(
-            Bug(BankedFile.elaborate, "step.eq(step + low)", "step.eq(step)", NO_BOOT),
-            Bug(BankedFile.elaborate, "settling.eq(settling - 1)", "settling.eq(settling)", NO_BOOT),
-            Bug(BankedFile.elaborate, 'm.next = "COUNT"', 'm.next = "LEAST"', NO_BOOT),
+            Bug(BankedFile._walk, "walk.step.eq(walk.step + walk.low)", "walk.step.eq(walk.step)", NO_BOOT),
+            Bug(BankedFile._give_pulses, "settling.eq(walk.settling - 1)", "settling.eq(walk.settling)", NO_BOOT),
+            Bug(BankedFile._begin, 'm.next = "COUNT"', 'm.next = "LEAST"', NO_BOOT),
         ),
     ),
 ]

@@ -5,6 +5,7 @@ from amaranth.lib.wiring import PureInterface
 
 from hardwall.hdl.axes.register_file import BankedFile
 from hardwall.hdl.axis.register_file import RegisterFile
+from hardwall.hdl.link.checks import Pulses
 from hardwall.model.axis.register_file import CELL_BITS, EXCLUSIVE, WITH_WORDS, Area, Design, Operation
 from hardwall.model.axis.registers import END, RegisterMap
 from stimuli.specs import spec
@@ -209,11 +210,11 @@ def every_operation_ends(bench: Bench) -> None:
     bench.promise(~bench.past(bench.reset, init=1) | boots & (left == block.boot_clocks))
 
 
-SHORT_BOOT = (("step.all()", "1"),)
+SHORT_BOOT = (Bug(RegisterFile._boot, "step.all()", "1"),)
 """A reset writes only one cell, so that a bug behind it shows in the first clocks."""
-NO_BOOT = (('m.next = "BOOT_TAKE"', 'm.next = "IDLE"'),)
+NO_BOOT = (Bug(RegisterFile._boot, 'm.next = "BOOT_TAKE"', 'm.next = "IDLE"'),)
 """A reset writes no cell at all."""
-SHORT_CHECKS = (*NO_BOOT, ('m.next = "LEAST"', 'm.next = "DONE"'))
+SHORT_CHECKS = (*NO_BOOT, Bug(RegisterFile._begin, 'm.next = "LEAST"', 'm.next = "DONE"'))
 """Nor does a check compare bounds, so that what several of them do shows in the first clocks."""
 PROPERTIES = [
     Property(
@@ -222,8 +223,8 @@ PROPERTIES = [
         one_frame_arms_or_moves,
         depth=2,
         bugs=(
-            Bug(RegisterFile.elaborate, "| several", "", SHORT_CHECKS),
-            Bug(RegisterFile.elaborate, "exclusive.eq(after)", "exclusive.eq(0)", SHORT_CHECKS),
+            Bug(RegisterFile._begin, " | pulses.several", "", SHORT_CHECKS),
+            Bug(Pulses.check, "exclusive.eq(self.after)", "exclusive.eq(0)", SHORT_CHECKS),
         ),
         within=12,
     ),
@@ -233,8 +234,8 @@ PROPERTIES = [
         pulses_are_asked_for,
         depth=2,
         bugs=(
-            Bug(RegisterFile.elaborate, "Signal(len(registers.pulses))", "Signal(len(registers.pulses), init=1)"),
-            Bug(RegisterFile.elaborate, "& host.value[0]", "", SHORT_BOOT),
+            Bug(Pulses.__init__, "Signal(len(registers.pulses))", "Signal(len(registers.pulses), init=1)"),
+            Bug(Pulses.__init__, "& host.value[0]", "", SHORT_BOOT),
         ),
     ),
     Property(
@@ -243,8 +244,8 @@ PROPERTIES = [
         checks_alone_find,
         depth=2,
         bugs=(
-            Bug(RegisterFile.elaborate, "step.eq(step + 1)", "[step.eq(step + 1), host.absent.eq(1)]"),
-            Bug(RegisterFile.elaborate, "host.absent.eq(0), ", "", NO_BOOT),
+            Bug(RegisterFile._boot, "step.eq(step + 1)", "[step.eq(step + 1), self.host.absent.eq(1)]"),
+            Bug(Pulses.begin, "host.absent.eq(0), ", "", NO_BOOT),
         ),
         within=12,
     ),
@@ -253,7 +254,7 @@ PROPERTIES = [
         WHERE,
         live_words_are_written,
         depth=2,
-        bugs=(Bug(RegisterFile.elaborate, "word.address - LIVE + 1", "word.address - LIVE", SHORT_BOOT),),
+        bugs=(Bug(RegisterFile._write, "word.address - LIVE + 1", "word.address - LIVE", SHORT_BOOT),),
     ),
     Property(
         "each operation takes its own latency and the wait for a sample; one may begin boot_clocks after a reset",
@@ -261,9 +262,14 @@ PROPERTIES = [
         every_operation_ends,
         depth=2,
         bugs=(
-            Bug(RegisterFile.elaborate, "step.eq(step + 1)", "step.eq(step)"),
-            Bug(RegisterFile.elaborate, 'm.next = "COUNT"', 'm.next = "LEAST"', NO_BOOT),
-            Bug(RegisterFile.elaborate, "m.If(with_words)", "m.If(~commit)", NO_BOOT),
+            Bug(RegisterFile._boot, "step.eq(step + 1)", "step.eq(step)"),
+            Bug(RegisterFile._begin, 'm.next = "COUNT"', 'm.next = "LEAST"', NO_BOOT),
+            Bug(
+                RegisterFile._begin,
+                "Cat(pulses.marked(name) for name in WITH_WORDS).any()",
+                "~pulses.marked('commit')",
+                NO_BOOT,
+            ),
         ),
     ),
 ]

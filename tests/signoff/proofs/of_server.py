@@ -2,7 +2,8 @@
 
 from amaranth.hdl import Cat, Mux, Signal, Value
 
-from hardwall.hdl.link.server import ECHOED, HEAD, HEAD_OF_OTHERS, Server
+from hardwall.hdl.link.server import Server
+from hardwall.hdl.link.walk import ECHOED, HEAD, HEAD_OF_OTHERS, Walk
 from hardwall.model.axis.register_file import Design, Operation
 from hardwall.model.axis.registers import COUNTERS, RegisterMap
 from hardwall.model.link import server as model
@@ -45,7 +46,7 @@ IDENTIFIES = HEAD_OF_OTHERS * CLOCKS_OF_A_BYTE + MOST * PER_REGISTER[Operation.R
 ALL = 2 + BEGINS[Operation.CHECK_READ]
 
 CHECKS_WRITES = "with m.Case(Operation.CHECK_WRITE):"
-CLEARS_BEFORE = f"{CHECKS_WRITES}\n{16 * ' '}m.d.comb += file.clear.eq(1)"
+CLEARS_BEFORE = f"{CHECKS_WRITES}\n{12 * ' '}m.d.comb += file.clear.eq(1)"
 """What the check of the registers to read has found is forgotten before those to write are checked."""
 
 
@@ -191,8 +192,8 @@ PROPERTIES = [
         depth=2,
         quick=True,
         bugs=(
-            Bug(Server.elaborate, "m.d.sync += phase.eq(phase + 1)", "m.d.sync += phase.eq(phase)"),
-            Bug(Server.elaborate, "code.eq(exception)", "code.eq(0)"),
+            Bug(Walk.end_phase, "self.phase.eq(self.phase + 1)", "self.phase.eq(self.phase)"),
+            Bug(Walk.refuse, "code.eq(exception)", "code.eq(0)"),
         ),
     ),
     Property(
@@ -200,7 +201,7 @@ PROPERTIES = [
         WHERE,
         keeps_what_it_asks_for,
         depth=2,
-        bugs=(Bug(Server.elaborate, "file.value.eq(word)", "file.value.eq(frames.byte)"),),
+        bugs=(Bug(Walk._ask, "file.value.eq(word)", "file.value.eq(self.frames.byte)"),),
     ),
     Property(
         "registers are written only for a request to this unit that writes and in which no check has found anything",
@@ -208,9 +209,9 @@ PROPERTIES = [
         writes_what_was_checked,
         depth=2,
         bugs=(
-            Bug(Server.elaborate, "m.If(frames.verdict == Verdict.REQUEST)", "m.If(frames.verdict != Verdict.FOREIGN)"),
-            Bug(Server.elaborate, "m.If(file.absent)", "m.If(file.absent & file.outside)"),
-            Bug(Server.elaborate, CHECKS_WRITES, CLEARS_BEFORE),
+            Bug(Server._count, "m.If(frames.verdict == Verdict.REQUEST)", "m.If(frames.verdict != Verdict.FOREIGN)"),
+            Bug(Server._begin_phases, "m.If(file.absent)", "m.If(file.absent & file.outside)"),
+            Bug(Server._begin_phases, CHECKS_WRITES, CLEARS_BEFORE),
         ),
     ),
 ]

@@ -18,12 +18,12 @@ from .widths import FreeProducts
 BIT = {cause.name: bit for bit, cause in enumerate(CAUSES)}
 
 
-SHOWN_ONES = "getattr(self, name).eq(getattr(supervisor, name))"
+SHOWN_ONES = "ports(supervisor, SHOWN)"
 WORDS_IN_RANGE = '"word_range": Cat(beyond).any()'
 FAULT_LOOP = '"external_fault": ~levels["external_fault"]'
 EXCHANGED = '"external_fault": Cat(beyond).any(), "word_range": ~levels["external_fault"]'
 """The last one of a name is what a dict has: the two causes with the source of each other."""
-PAST_THE_SUPERVISOR = "getattr(self, name).eq(axis.count if name == 'driven' else getattr(supervisor, name))"
+PAST_THE_SUPERVISOR = f"{SHOWN_ONES} | {{'driven': axis.count}}"
 
 
 def supervised(estimator: str, bench: Bench) -> SupervisedAxis:
@@ -159,7 +159,7 @@ def of(estimator: str) -> list[Property]:
             depth=2,
             bugs=(
                 Bug(Supervisor.elaborate, "self.arm & ready", "ready"),
-                Bug(SupervisedAxis.elaborate, "asked | turned", "turned"),
+                Bug(SupervisedAxis.elaborate, "self.disarm | turned", "turned"),
             ),
             within=12,
         ),
