@@ -15,6 +15,7 @@ from hardwall.sim.jobs import cluster
 from hardwall.sim.jobs.job_pool import Threads
 from hardwall.sim.jobs.store import Store
 from hardwall.sim.scene.case import Case
+from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.load import read
 from hardwall.sim.walls import mapping, methods, zwidth
 from hardwall.sim.walls.boundary import BoundaryPoint
@@ -271,3 +272,10 @@ def test_the_columns_of_the_table_that_need_it_are_explained():
     columns = ["area", "of starts", "held", "in place", "to B", "islands", "undecided"]
     assert said[: len(columns)] == columns
     assert all(any(heading.startswith(word) for heading in headings) for word in columns)
+
+
+def test_a_scene_without_a_grid_is_refused_before_there_is_a_crew():
+    mapper = mapping.Mapper("fixed", 1, Store("zwidth"), pytest.fail, pytest.fail)
+    with pytest.raises(SceneError, match=r"^mhz: zwidth is missing"):
+        mapper("maps", [Case.of("mhz")])
+    assert mapper.effort()[:2] == ("fixed", 0)
