@@ -1,16 +1,16 @@
 """The command `accuracy`."""
 
-from dataclasses import dataclass, replace
+from functools import partial
 from typing import Annotated, Any
 
 import typer
 
-from ..sim.estimates import figures, recording, signals
-from ..sim.estimates.accuracy import COARSEN, PHASE, errors_of, measure, measure_recording, spec_of
-from ..sim.estimates.replay import ReplayError, check_length, plan
+from ..sim.estimates import figures, signals
+from ..sim.estimates.accuracy import PHASE, errors_of
+from ..sim.estimates.recording import RecordingError
+from ..sim.estimates.replay import ReplayError
 from ..sim.jobs.store import Store
 from ..sim.studies import accuracy
-from ..sim.walls.methods import Curve
 from .errors import BadInput
 from .options import BackendOption, EstimatorsOption, within
 from .scenes import EncoderSetOption, curves_of, encoder_of, rates_of
@@ -66,19 +66,14 @@ def command(
         of_all["encoder"] = encoder
     if acceleration_max is not None:
         of_all["acceleration_max_m_per_s2"] = acceleration_max
-    labelled = accuracy.jobs(curves, known, at, of_all)
-    labels, jobs = [label for label, _ in labelled], [job for _, job in labelled]
+    run = partial(options.results, store=Store("accuracy"))
     try:
         errors_of(encoder)
-        # Invalid input is reported before anything long begins.
-        for job in jobs:
-            spec_of(job)
-        recordings = _recordings(curves, recorded, backend)
-        rows = options.results(f"accuracy, {backend}", measure, jobs, Store("accuracy"))
-        rows += options.results(f"recordings, {backend}", recordings.measure, recordings.jobs, Store("recordings"))
-    except (ValueError, recording.RecordingError, ReplayError) as error:
+        motions = accuracy.jobs(curves, known, at, of_all)
+        result = accuracy.study(figure, curves, motions, recorded, backend, run)
+    except (ValueError, RecordingError, ReplayError) as error:
         raise BadInput(str(error)) from None
-    options.finish(accuracy.Accuracy(figure, curves, rows, labels))
+    options.finish(result)
 
 
 def _encoder(assignments: list[str] | None, phase_error_counts: float) -> dict[str, Any]:
@@ -103,39 +98,3 @@ def _signals(names: list[str]) -> tuple[list[str], list[tuple[str, str]]]:
             raise BadInput(f"--signal: {error}, or FILE.csv:COLUMN") from None
         known.append(name)
     return known, recorded
-
-
-@dataclass(frozen=True)
-class _Recordings:
-    """Recordings, each read once: a job has the digest of the bytes that its counts come from.
-
-    Attributes:
-        read: the recordings, by digest and column.
-        jobs: the arguments of `measure`, which JSON can hold.
-    """
-
-    read: dict[tuple[str, str], recording.Recording]
-    jobs: list[dict]
-
-    def measure(self, file: str, column: str, content: str, **how: str) -> dict:
-        """Return the row of a job: see `measure_recording`."""
-        return measure_recording(replace(self.read[content, column], file=file), **how)
-
-
-def _recordings(curves: list[Curve], recorded: list[tuple[str, str]], backend: str) -> _Recordings:
-    """Return the recordings of (file, column) pairs, to be put through every estimator.
-
-    Raises:
-        RecordingError, ReplayError: if a recording is not valid, or too short to be judged, or an estimator cannot take
-            it.
-    """
-    read, jobs = {}, []
-    for file, column in recorded:
-        counts = recording.load(file, column)
-        check_length(counts)
-        for estimator in dict.fromkeys(curve.estimator for curve in curves):
-            plan(counts, estimator, backend, COARSEN)
-        read[counts.content, column] = counts
-        keys = {"file": file, "column": column, "content": counts.content, "backend": backend}
-        jobs += [{"estimator": curve.estimator, "output": curve.output} | keys for curve in curves]
-    return _Recordings(read, jobs)

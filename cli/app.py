@@ -7,7 +7,6 @@ and nothing that takes long: until `main` hears signals, an interrupt is a trace
 
 import gc
 import sys
-from importlib import import_module
 
 from ..model.runtime import termination
 from ..model.runtime.build_folder import BuildFolderError
@@ -41,7 +40,9 @@ def main() -> None:
 def _run() -> tuple[int, str]:
     """Run the command that is called; return the exit code and the message of its failure."""
     try:
-        import_module(".group", __package__).run()
+        from . import group  # noqa: PLC0415  (what reads the options comes with an extra)
+
+        group.run()
     except (BadInput, ValueError) as error:
         # A scene may be valid and its axis have no board, which is an error of the model; its import is slow.
         of_board = hasattr(error, "field")
@@ -49,7 +50,9 @@ def _run() -> tuple[int, str]:
             raise
         return 2, f"the scene's {error}" if of_board else str(error)
     except ModuleNotFoundError as error:
-        extra = import_module(".extras", __package__).extra_of(error.name)
+        from .extras import extra_of  # noqa: PLC0415  (the list of what is installed is slow to import)
+
+        extra = extra_of(error.name)
         if extra is None:
             raise
         return 1, f"{error.name} is not installed: it comes with pip install 'hardwall[{extra}]'"

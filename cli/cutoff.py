@@ -7,8 +7,8 @@ import typer
 from ..sim.scene.case import Case
 from ..sim.scene.load import names
 from ..sim.studies import cutoff
-from ..sim.walls.zwidth import STARTS
-from .maps import Maps
+from ..sim.walls.mapping import STARTS
+from .maps import mapper_of
 from .options import ModelOption, StartsOption
 from .scenes import refuse_for_maps
 from .study import StudyOptions, study
@@ -29,4 +29,4 @@ def command(
     changes = options.changes()
     refuse_for_maps(changes, "it is what is searched")
     cases = [Case.of(scene, changes) for scene in dict.fromkeys(scenes or cutoff.SCENES)]
-    options.finish(cutoff.study(cases, Maps(options, backend, starts)))
+    options.finish(cutoff.study(cases, mapper_of(options, backend, starts)))

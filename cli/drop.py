@@ -1,10 +1,12 @@
 """The command `drop`."""
 
+from functools import partial
+
 from ..sim.jobs.store import Store
 from ..sim.scene.case import Case
 from ..sim.studies import drop
-from ..sim.walls.zwidth import STARTS
-from .maps import Maps
+from ..sim.walls.mapping import STARTS
+from .maps import mapper_of
 from .options import ModelOption, StartsOption
 from .scenes import WALL, SceneArgument, refuse
 from .study import StudyOptions, study
@@ -17,13 +19,10 @@ def command(
     starts: StartsOption = STARTS,
     backend: ModelOption = "fixed",
 ) -> None:
-    changes, known = options.changes(), Store("drop", options.resume)
+    changes = options.changes()
     refuse_methods_and_walls(changes)
-
-    def striking(title: str, jobs: list[dict]) -> list[dict]:
-        return options.results(title, drop.strike, jobs, known)
-
-    options.finish(drop.study(Case.of(scene, changes), backend, striking, Maps(options, backend, starts)))
+    run = partial(options.results, store=Store("drop", options.resume))
+    options.finish(drop.study(Case.of(scene, changes), backend, run, mapper_of(options, backend, starts)))
 
 
 def refuse_methods_and_walls(changes: dict) -> None:

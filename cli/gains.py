@@ -2,7 +2,7 @@
 
 from ..sim.scene.case import Case
 from ..sim.studies import gains
-from .maps import Maps
+from .maps import mapper_of
 from .options import ModelOption, StartsOption
 from .scenes import SceneArgument, refuse_for_maps
 from .study import StudyOptions, study
@@ -14,4 +14,4 @@ def command(
 ) -> None:
     changes = options.changes()
     refuse_for_maps(changes, "it is what is searched")
-    options.finish(gains.study(Case.of(scene, changes), Maps(options, backend, starts)))
+    options.finish(gains.study(Case.of(scene, changes), mapper_of(options, backend, starts)))

@@ -75,7 +75,10 @@ class LazyGroup(TyperGroup):
 
 
 def loaded(name: str) -> Any:
-    """Import the module of a command; return the command with its options."""
+    """Import the module of a command; return the command with its options.
+
+    The modules have the names of `COMMANDS`: a table of 30 imports would load them all, for a help that needs none.
+    """
     alone = typer.Typer(add_completion=False)
     alone.command(name, help=COMMANDS[name])(import_module(f".{name}", __package__).command)
     return typer.main.get_command(alone)
@@ -117,8 +120,9 @@ def run() -> None:
     try:
         app(sys.argv[1:] or ["--help"], prog_name="hardwall", standalone_mode=False)
     except typer.TyperException as error:
-        # The words for it come from what a scene is made of, which is imported only now.
-        raise BadInput(import_module(".refusal", __package__).refusal(error)) from None
+        from .refusal import refusal  # noqa: PLC0415  (its words come from what a scene is made of)
+
+        raise BadInput(refusal(error)) from None
     except (KeyError, ValueError):
         # A shell that asks without the words so far is told nothing: what is printed stands in its user's line.
         if COMPLETING not in os.environ:

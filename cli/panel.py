@@ -4,7 +4,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
-from importlib import import_module
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -54,9 +53,9 @@ def command(
     if port == VIRTUAL:
         if baud is not None or pace is not None:
             raise BadInput("--baud and --pace are for a board at a port, not for `hardwall panel virtual`")
-        # A board at a port needs nothing of the simulation, which may not be installed.
-        benches = import_module(".virtual_bench", __package__)
-        with benches.bench_of(scene or SCENE, estimator, set_, identity, paced=scene is None) as board:
+        from .virtual_bench import bench_of  # noqa: PLC0415  (a board at a port needs no simulation)
+
+        with bench_of(scene or SCENE, estimator, set_, identity, paced=scene is None) as board:
             try:
                 _serve(board.connect, board, f"{board.name}, virtual", (host, http), seconds)
             except PortError:

@@ -7,7 +7,7 @@ import typer
 from ..sim.scene.case import Case
 from ..sim.studies import rates
 from ..sim.walls.methods import methods
-from .maps import Maps
+from .maps import mapper_of
 from .options import ModelOption, StartsOption, methods_option
 from .scenes import SceneArgument, curves_of, rates_of, refuse, refuse_for_maps
 from .study import StudyOptions, study
@@ -32,4 +32,4 @@ def command(
     rates_hz = sorted(rates_of(tried, "--rates")) if tried is not None else list(rates.RATES_HZ)
     case = Case.of(scene, changes)
     curves = curves_of(",".join(rates.METHODS) if wanted is None else wanted, methods(case.scene))
-    options.finish(rates.study(case, curves, rates_hz, Maps(options, backend, starts)))
+    options.finish(rates.study(case, curves, rates_hz, mapper_of(options, backend, starts)))

@@ -9,7 +9,6 @@ from ..sim.estimates.moved_handle import MotionError
 from ..sim.jobs.store import Store
 from ..sim.scene.case import Case
 from ..sim.studies import rendered
-from ..sim.studies.rendered_result import Moving
 from ..sim.walls.methods import methods
 from .errors import BadInput
 from .options import BackendOption, StartsOption, methods_option, numbers_of, within
@@ -46,7 +45,7 @@ def command(
 ) -> None:
     changes = options.changes()
     refuse(changes, METHODS, "see --estimators")
-    moving = Moving(
+    moving = rendered.Moving(
         [round(each) for each in _few(frequencies, "--frequencies", *FREQUENCIES_HZ, "Hz", whole=True)],
         within(amplitude, "--amplitude", *AMPLITUDES_MM, "mm") / 1e3,
         [each / 1e3 for each in _few(speeds, "--speeds", *SPEEDS_MM_PER_S, "mm/s")],

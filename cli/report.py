@@ -126,7 +126,10 @@ def _do_all(steps: Iterable[Callable[[], None]]) -> None:
 
 
 def _pictures(name: str) -> Any:
-    """Return a module of pictures by `.` and its name; Matplotlib is loaded only if something is drawn."""
+    """Return a module of pictures by `.` and its name, which is that of the command.
+
+    It is imported only if something is drawn: Matplotlib is slow, and commands of a board have no room `sim`.
+    """
     # Pictures go to files, whatever draws the user's windows. What Matplotlib says of its own settings and folders is
     # not about the picture, and would stand between the lines of this program.
     os.environ["MPLBACKEND"] = "agg"
@@ -139,6 +142,9 @@ OUTPUT = {field.name for field in fields(ReportOptions)}
 
 def reports(*wanted: str, kind: type[ReportOptions] = ReportOptions) -> Callable[[Callable[..., None]], Callable]:
     """Return a decorator that makes a command of a function whose first argument is a value of its shared options.
+
+    Typer reads options from a signature alone, so the shared ones are added to it: written out, a command would have up
+    to six parameters more, only to pass them on.
 
     Args:
         wanted: names of the shared options that the command has, besides `as_json`, which all commands have.

@@ -7,10 +7,10 @@ import typer
 
 from ..sim.scene.case import Case
 from ..sim.studies import zwidth
+from ..sim.walls.mapping import STARTS
 from ..sim.walls.methods import methods
 from ..sim.walls.worst_variant import HELD_BY
-from ..sim.walls.zwidth import STARTS
-from .maps import Maps
+from .maps import mapper_of
 from .options import BackendOption, StartsOption, output_file
 from .scenes import SceneArgument, curves_of, hands_of, refuse, refuse_for_maps
 from .study import StudyOptions, study
@@ -52,5 +52,5 @@ def command(
         refuse(changes, ("hand.",), "see --hands")
     case = Case.of(scene, changes)
     curves = None if wanted is None else curves_of(wanted, methods(case.scene))
-    found = zwidth.study(case, curves, holding, Maps(options, backend, starts))
+    found = zwidth.study(case, curves, holding, mapper_of(options, backend, starts))
     options.finish(found, {"hits": (hits, found.save)} if hits else {})

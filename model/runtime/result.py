@@ -52,6 +52,20 @@ class Values(Summary):
         return self.values
 
 
+@dataclass(frozen=True)
+class Rows:
+    """A result whose report is its rows alone; each kind lays them out in tables of its own."""
+
+    rows: list[dict[str, Any]]
+
+    def report(self) -> dict[str, Any]:
+        """Return the rows, units in the keys."""
+        return {"rows": self.rows}
+
+    def notes(self) -> list[str]:
+        return []
+
+
 def text_of(value: Any) -> str:
     """Return a value of a report as text for people: numbers with six digits, lists in a row, a dash for no value."""
     if value is None or value == []:

@@ -197,14 +197,11 @@ def check_length(recording: Recording) -> None:
         )
 
 
-def _check_numbers(recording: Recording, coarsen: object, bound: float | None, cutoff: float) -> None:
+def _check_numbers(recording: Recording, coarsen: object, bound: float | None) -> None:
     """Raise ReplayError if a recording cannot be replayed with these numbers."""
     rate = recording.rate_hz
     if isinstance(coarsen, bool) or not (isinstance(coarsen, int) and 1 <= coarsen <= COARSEN_MAX):
         raise ArgumentError("coarsen", f"must be a whole number of 1 to {COARSEN_MAX}, not {shown(coarsen)}")
-    if not 0 < cutoff < rate / 2:
-        said = f"must be more than 0 and less than {rate / 2:g}, half the rate, not {cutoff!r}"
-        raise ArgumentError("reference_hz", said)
     least, most = (number * (rate / SECOND) ** 2 for number in NUMBERS)
     if bound is not None and not least <= bound <= most:
         said = f"must be {least:g} to {most:g} counts/s^2 at {rate:g} Hz, not {bound!r}"
@@ -242,7 +239,6 @@ def plan(
     backend: str,
     coarsen: int = 1,
     acceleration_max_counts_per_s2: float | None = None,
-    reference_hz: float | None = None,
 ) -> Plan:
     """Derive what a replay runs; the arguments are those of `replay`.
 
@@ -250,8 +246,8 @@ def plan(
         ReplayError: in one line, what is refused and what is accepted.
     """
     rate, given = recording.rate_hz, acceleration_max_counts_per_s2
-    cutoff = min(REFERENCE_HZ, rate / 4) if reference_hz is None else reference_hz
-    _check_numbers(recording, coarsen, given, cutoff)
+    cutoff = min(REFERENCE_HZ, rate / 4)
+    _check_numbers(recording, coarsen, given)
     counts = _counts_for(recording, coarsen, estimator, backend)
     reference = zero_phase_velocity(recording.counts, rate, cutoff)
     bound = given
@@ -278,7 +274,6 @@ def replay(
     backend: str = "fixed",
     coarsen: int = 1,
     acceleration_max_counts_per_s2: float | None = None,
-    reference_hz: float | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Replay:
     """Put a recording through an estimator.
@@ -290,7 +285,6 @@ def replay(
         backend: one of `backends.BACKENDS`.
         coarsen: divide the counts by this (floor division).
         acceleration_max_counts_per_s2: the bound C that sets the gains; None to derive it from the recording.
-        reference_hz: cutoff of the reference; None for the usual cutoff.
         progress: function called with the number of samples done.
 
     Raises:
@@ -300,7 +294,7 @@ def replay(
     output = _check_names(estimator, output, backend)
     rate = recording.rate_hz
     counts, cutoff, reference, bound, spec = plan(
-        recording, estimator, backend, coarsen, acceleration_max_counts_per_s2, reference_hz
+        recording, estimator, backend, coarsen, acceleration_max_counts_per_s2
     )
     velocity, flags, seconds = run(spec, counts, backend, output, progress)
 

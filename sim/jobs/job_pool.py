@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import AbstractContextManager
 from queue import SimpleQueue
 from typing import Any, Protocol, Self
 
@@ -66,3 +67,18 @@ class Threads:
             children.kill_those_of(self._identities)
             time.sleep(POLL_S)
         self._pool.shutdown()
+
+
+def pool_of(jobs: int, workers: int | None = None, scheduler: str | None = None) -> AbstractContextManager[JobPool]:
+    """Return a context with who does so many jobs at a time: threads of this process, or the workers of a cluster.
+
+    Args:
+        jobs: the most jobs at a time.
+        workers: number of threads; None for one a core.
+        scheduler: the address of a cluster's scheduler: see `cluster.connected`; None for threads.
+    """
+    if scheduler is None:
+        return Threads(jobs, workers)
+    from .cluster import connected  # noqa: PLC0415  (Dask is loaded only if there is a cluster)
+
+    return connected(scheduler)

@@ -6,6 +6,9 @@ from typing import Any
 from .job_pool import Threads
 from .store import Store
 
+Run = Callable[[str, Callable[..., Any], list[dict]], list[Any]]
+"""What a study has its jobs done by: it returns their results, by a title, the function, and the arguments of each."""
+
 
 def run(
     function: Callable[..., Any],

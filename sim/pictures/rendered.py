@@ -3,7 +3,7 @@
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..studies.rendered_result import Rendered
+from ..studies.rendered import Rendered
 from ..studies.rendered_setting import Setting, Spread, rate_text
 from .style import LABEL_PT, THEORY, lay_out, looks, new_figure, page, plain_decades
 

@@ -57,7 +57,7 @@ class Case:
 
     @property
     def variants(self) -> dict[str, "Case"]:
-        """The cases, by name, that are hit for this one: itself, without a name. See `walls.worst.WorstCase`."""
+        """The cases, by name, that are hit for this one: itself, without a name. See `worst_variant.WorstCase`."""
         return {"": self}
 
     def changed(self, changes: dict[str, Any], label: str | None = None) -> "Case":

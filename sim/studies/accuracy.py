@@ -1,10 +1,13 @@
 """How accurate estimators are, side by side: every estimator on every signal, at every rate."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ...model.runtime.result import Table, table_of
-from ..estimates.accuracy import encoder_of, said_of
+from ..estimates import recording
+from ..estimates.accuracy import COARSEN, encoder_of, measure, measure_recording, said_of, spec_of
+from ..estimates.replay import check_length, plan
+from ..jobs.parallel import Run
 from ..walls.methods import Curve
 
 
@@ -65,3 +68,71 @@ def jobs(curves: list[Curve], names: list[str], rates_hz: list[int], options: di
         for name in names
         for curve in curves
     ]
+
+
+@dataclass(frozen=True)
+class Recordings:
+    """Recordings, each read once: a job has the digest of the bytes that its counts come from.
+
+    Attributes:
+        read: the recordings, by digest and column.
+        jobs: the arguments of `measure`, which JSON can hold.
+    """
+
+    read: dict[tuple[str, str], recording.Recording]
+    jobs: list[dict]
+
+    def measure(self, file: str, column: str, content: str, **how: str) -> dict:
+        """Return the row of a job: see `measure_recording`."""
+        return measure_recording(replace(self.read[content, column], file=file), **how)
+
+
+def recordings_of(curves: list[Curve], recorded: list[tuple[str, str]], backend: str) -> Recordings:
+    """Return the recordings of (file, column) pairs, to be put through every estimator.
+
+    Raises:
+        RecordingError, ReplayError: if a recording is not valid, or too short to be judged, or an estimator cannot take
+            it.
+    """
+    read, jobs = {}, []
+    for file, column in recorded:
+        counts = recording.load(file, column)
+        check_length(counts)
+        for estimator in dict.fromkeys(curve.estimator for curve in curves):
+            plan(counts, estimator, backend, COARSEN)
+        read[counts.content, column] = counts
+        keys = {"file": file, "column": column, "content": counts.content, "backend": backend}
+        jobs += [{"estimator": curve.estimator, "output": curve.output} | keys for curve in curves]
+    return Recordings(read, jobs)
+
+
+def study(
+    figure: int | None,
+    curves: list[Curve],
+    motions: list[tuple[str, dict]],
+    recorded: list[tuple[str, str]],
+    backend: str,
+    run: Run,
+) -> Accuracy:
+    """Return the errors of estimators on known motions and on recordings; all input is checked before any is measured.
+
+    Args:
+        figure: number of the founding paper's figure; None for none.
+        curves: the estimators.
+        motions: result of `jobs`.
+        recorded: file and column of every recording.
+        backend: one of `backends.BACKENDS`.
+        run: what does the jobs.
+
+    Raises:
+        ValueError: if the arguments of a motion are not valid.
+        RecordingError, ReplayError: see `recordings_of`.
+        RuntimeError: if the RTL could not be built.
+    """
+    labels, known = [label for label, _ in motions], [job for _, job in motions]
+    for job in known:
+        spec_of(job)
+    recordings = recordings_of(curves, recorded, backend)
+    rows = run(f"accuracy, {backend}", measure, known)
+    rows += run(f"recordings, {backend}", recordings.measure, recordings.jobs)
+    return Accuracy(figure, curves, rows, labels)

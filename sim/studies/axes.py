@@ -1,11 +1,10 @@
 """What several axes in one pipeline take of a part, and how fast each of them is, against their number."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
 from ...model.axes.axis import AxesSpec
-from ...model.runtime.result import Table, table_of
+from ...model.runtime.result import Rows, Table, table_of
 from ..rtl.pipeline import synthesise_axes
 from ..scene.load import load
 
@@ -17,15 +16,8 @@ CLOCK_HZ = 96_000_000
 NUMBERS = (1, 2, 4, 8, 16, 32)
 
 
-@dataclass(frozen=True)
-class AxesCosts:
+class AxesCosts(Rows):
     """What axes take and how fast they are: rows of `cost`."""
-
-    rows: list[dict[str, Any]]
-
-    def report(self) -> dict[str, Any]:
-        """Return the rows."""
-        return {"rows": self.rows}
 
     def tables(self) -> list[Table]:
         """Return a table for every kind of axes."""

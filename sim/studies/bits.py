@@ -1,9 +1,8 @@
 """What a bit buys: an estimator's error and logic as its words shrink, bit by bit, from the derived widths."""
 
-from dataclasses import dataclass
 from typing import Any
 
-from ...model.runtime.result import Table, table_of
+from ...model.runtime.result import Rows, Table, table_of
 from ..estimates import signals
 from ..estimates.accuracy import axis_spec, measure
 from ..rtl.synthesis import estimator_cells
@@ -14,15 +13,8 @@ DEVICE = "ecp5-25k"
 DROPPED = range(13)
 
 
-@dataclass(frozen=True)
-class Bits:
+class Bits(Rows):
     """Errors and logic by width: rows of `bit`."""
-
-    rows: list[dict[str, Any]]
-
-    def report(self) -> dict[str, Any]:
-        """Return the rows, units in the keys."""
-        return {"rows": self.rows}
 
     def tables(self) -> list[Table]:
         """Return a table of the rows."""
@@ -32,9 +24,6 @@ class Bits:
         ]
         heads = ("bits dropped", "velocity bits", "RMS (mm/s)", "LUT4", "FF", "DSP")
         return [table_of(("estimator",), heads, lines)]
-
-    def notes(self) -> list[str]:
-        return []
 
 
 def jobs(curves: list[Curve], sample_hz: int) -> list[dict[str, Any]]:

@@ -1,10 +1,9 @@
 """The logic cost of a velocity estimator: synthesised alone, and placed and routed as part of a board."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
-from ...model.runtime.result import Table, table_of
+from ...model.runtime.result import Rows, Table, table_of
 from ..boards.description import board_of
 from ..rtl.flow import DoesNotFitError
 from ..rtl.synthesis import estimator_cells, synthesise
@@ -14,15 +13,8 @@ DEVICES = ("ecp5-25k", "ice40-up5k", "gw1nr-9")
 """The parts that are compared, one of each kind; each runs the scene of its board."""
 
 
-@dataclass(frozen=True)
-class Costs:
+class Costs(Rows):
     """Costs of estimators on parts: rows of `cost`."""
-
-    rows: list[dict[str, Any]]
-
-    def report(self) -> dict[str, Any]:
-        """Return the rows."""
-        return {"rows": self.rows}
 
     def tables(self) -> list[Table]:
         """Return two tables for every part: the estimators alone, and the board with each estimator."""
@@ -32,9 +24,6 @@ class Costs:
             tables.append(table_of((f"{device}: alone",), ALONE, [_alone(row) for row in own]))
             tables.append(table_of((f"{device}: board",), BOARD, [_board(row) for row in own]))
         return tables
-
-    def notes(self) -> list[str]:
-        return []
 
 
 ALONE = ("LUT4", "FF", "DSP", "BRAM", "clocks")

@@ -22,7 +22,8 @@ from ...model.runtime.result import Table, table_of
 from ..scene.case import Case, accepted
 from ..scene.schema import Scene
 from ..walls.grid import wider_grid
-from ..walls.zwidth import Effort, Map, Mapper
+from ..walls.mapping import Effort, Mapper
+from ..walls.zwidth import Map
 from .zwidth import area_text, interval_text, plus_of_areas
 
 SCENES = ("seed-2011", "desktop-arm", "maglev")

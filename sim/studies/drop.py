@@ -15,22 +15,22 @@ friction either holds or does not, whatever the stiffness. There are four experi
 
 import math
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 
+from ..jobs.parallel import Run
 from ..scene.case import Case, accepted
 from ..scene.errors import SceneError
 from ..scene.schema import Scene
 from ..walls import hit
 from ..walls.chatter import at_rest
 from ..walls.grid import wider_grid
+from ..walls.mapping import Mapper
 from ..walls.methods import PROPOSED, Curve, methods
 from ..walls.starts import start as start_of
-from ..walls.zwidth import Mapper
 from .drop_result import STIFFNESS_N_PER_M, Drop, End, Law, Shaken
 
 DAMPINGS_N_S_PER_M = np.geomspace(3, 400, 18).round(1)
@@ -60,9 +60,6 @@ PAPERS = ("proposed", "adjusted")
 STIFFNESSES_N_PER_M = (2.5e3, 5e3, 10e3, 20e3, 30e3)
 ENDS_N_S_PER_M = np.geomspace(20, 240, 14).round(1)
 """The dampings of the walls in the experiment on ends."""
-
-Striking = Callable[[str, list[dict]], list[dict]]
-"""A function that returns the result of `strike` for every job; its text is the title of the progress bar."""
 
 
 def curves(scene: Scene) -> dict[str, Curve]:
@@ -100,13 +97,13 @@ def strike(scene: str, text: str, changes: dict[str, Any], damping: float, start
     return {"rests": rests, "stable": result.stable, "rms_m": result.rms_m}
 
 
-def study(case: Case, backend: str, striking: Striking, mapper: Mapper) -> Drop:
+def study(case: Case, backend: str, run: Run, mapper: Mapper) -> Drop:
     """Return the four experiments on a scene.
 
     Args:
         case: the scene.
         backend: `float` or `fixed`.
-        striking: function that makes single hits.
+        run: what does the single hits.
         mapper: function that makes maps, on the same backend.
 
     Raises:
@@ -131,9 +128,9 @@ def study(case: Case, backend: str, striking: Striking, mapper: Mapper) -> Drop:
     return Drop(
         plain,
         {name: at_rest(own.scene, backend) for name, own in cases.items()},
-        _shaken(cases, backend, striking),
-        _ends(cases, backend, striking),
-        _laws(changed, backend, striking),
+        _shaken(cases, backend, run),
+        _ends(cases, backend, run),
+        _laws(changed, backend, run),
         dict(zip(compared, maps, strict=True)),
         mapper.effort(),
     )
@@ -162,20 +159,20 @@ def _job(case: Case, damping: float, start: int, backend: str) -> dict:
     return case.job() | {"damping": damping, "start": start, "backend": backend}
 
 
-def _shaken(cases: dict[str, Case], backend: str, striking: Striking) -> list[Shaken]:
+def _shaken(cases: dict[str, Case], backend: str, run: Run) -> list[Shaken]:
     walls = list(product(cases, DAMPINGS_N_S_PER_M.tolist(), range(2)))
     jobs = [_job(cases[name], damping, start, backend) for name, damping, start in walls]
-    results = striking("shaken", jobs)
+    results = run("shaken", strike, jobs)
     return [Shaken(name, damping, result["rms_m"]) for (name, damping, _), result in zip(walls, results, strict=True)]
 
 
-def _ends(cases: dict[str, Case], backend: str, striking: Striking) -> list[End]:
+def _ends(cases: dict[str, Case], backend: str, run: Run) -> list[End]:
     """Return the ends; every damping is tried, because a stiff wall has a least damping too."""
     walls = {}
     for name, stiffness in product(PAPERS, STIFFNESSES_N_PER_M):
         walls[name, stiffness] = cases[name].changed({"wall.stiffness_n_per_m": stiffness})
     hits = list(product(walls, ENDS_N_S_PER_M.tolist(), range(STARTS)))
-    results = striking("ends", [_job(walls[key], damping, start, backend) for key, damping, start in hits])
+    results = run("ends", strike, [_job(walls[key], damping, start, backend) for key, damping, start in hits])
     counts = {"rests": Counter(), "stable": Counter()}
     for (key, damping, _), result in zip(hits, results, strict=True):
         for what, count in counts.items():
@@ -188,7 +185,7 @@ def _ends(cases: dict[str, Case], backend: str, striking: Striking) -> list[End]
     return [End(*key, last("rests", key), last("stable", key)) for key in walls]
 
 
-def _laws(changed: dict[tuple[str, str, str], Case], backend: str, striking: Striking) -> list[Law]:
+def _laws(changed: dict[tuple[str, str, str], Case], backend: str, run: Run) -> list[Law]:
     """Return prediction and measurement for every change; the bisections of all changes go side by side."""
     least, most = DAMPINGS_N_S_PER_M[[0, -1]].tolist()
     low, high = dict.fromkeys(changed, least), dict.fromkeys(changed, most)
@@ -197,7 +194,7 @@ def _laws(changed: dict[tuple[str, str, str], Case], backend: str, striking: Str
         hits = list(product(changed, range(STARTS)))
         jobs = [_job(changed[key], middle[key], start, backend) for key, start in hits]
         resting = dict.fromkeys(changed, 0)
-        for (key, _), result in zip(hits, striking(f"laws, {step + 1} of {HALVINGS}", jobs), strict=True):
+        for (key, _), result in zip(hits, run(f"laws, {step + 1} of {HALVINGS}", strike, jobs), strict=True):
             resting[key] += result["rests"]
         for key, count in resting.items():
             side = low if count >= ENOUGH * STARTS else high

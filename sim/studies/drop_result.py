@@ -9,7 +9,8 @@ import numpy as np
 from ...model.runtime.result import Table, table_of
 from ..scene.schema import Scene
 from ..walls.chatter import Chatter
-from ..walls.zwidth import Effort, Map
+from ..walls.mapping import Effort
+from ..walls.zwidth import Map
 
 STIFFNESS_N_PER_M = 5e3
 """The stiffness of the walls that are hit one by one, soft enough to be stable by far without chatter."""

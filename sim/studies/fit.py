@@ -28,8 +28,9 @@ from ..scene.case import Case
 from ..scene.errors import SceneError
 from ..scene.schema import Scene
 from ..walls.figure_5 import ABOUT, NUMBER, Fact, facts
+from ..walls.mapping import Effort, Mapper, NeverReached
 from ..walls.methods import Curve, methods
-from ..walls.zwidth import Effort, Map, Mapper, NeverReached
+from ..walls.zwidth import Map
 
 READINGS = {"3-30": (3.0, 30.0), "30-300": (30.0, 300.0)}
 """The readings of the paper's B axis: its first and its last damping, N s/m."""
@@ -282,7 +283,7 @@ def study(
 
     Raises:
         SceneError: if the scene is not valid, or lacks a key that is searched.
-        zwidth.NeverReached: if the handle, with the scene's own values, does not reach the wall.
+        NeverReached: if the handle, with the scene's own values, does not reach the wall.
     """
     judge, plain = _Judge(case, reading, mapper), case.scene
     own = {key: _value(plain, key) for key in PARAMETERS}

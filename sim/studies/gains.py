@@ -24,8 +24,9 @@ from ..scene.case import Case, accepted
 from ..scene.schema import Scene
 from ..walls.boundary import Grid
 from ..walls.grid import grid_of, wider_grid
+from ..walls.mapping import Effort, Mapper
 from ..walls.methods import methods
-from ..walls.zwidth import Effort, Map, Mapper
+from ..walls.zwidth import Map
 from .lipschitz import least_alpha_m_per_s2
 from .zwidth import area_text, plus_of_areas
 

@@ -12,8 +12,9 @@ from ..scene.case import Case
 from ..scene.schema import Scene
 from ..walls import theory
 from ..walls.grid import grid_of
+from ..walls.mapping import Effort, Mapper
 from ..walls.methods import Curve
-from ..walls.zwidth import Effort, Map, Mapper
+from ..walls.zwidth import Map
 
 RATES_HZ = (1_000, 2_500, 10_000, 25_000, 100_000, 250_000, 1_000_000)
 METHODS = ("fdm", "butterworth", "adjusted", "levant:u1", "kalman", "levant-edge")

@@ -6,11 +6,16 @@ to be measured on a bench: what they move is chance, and tells how often a move 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from itertools import chain, combinations
+from dataclasses import dataclass, replace
+from itertools import chain, combinations, cycle
 from typing import Any
 
+from ..scene.case import Case
+from ..scene.errors import SceneError
 from ..scene.schema import Scene
+from ..walls import hit
+from ..walls.grid import grid_of
+from ..walls.methods import Curve, methods
 from .rates import CABLE, LAG, taken_out
 
 PARTS = {
@@ -61,6 +66,19 @@ UNKNOWN = 1e-3
 """The relative change of the handle's mass in the scatter."""
 SCATTER = "scatter"
 """The name of the axis of changes too slight to be measured."""
+
+
+METHODS = "adjusted", "fdm-500"
+GRID = {
+    "zwidth.damping_from_n_s_per_m": 10.0,
+    "zwidth.damping_to_n_s_per_m": 70.0,
+    "zwidth.damping_step_n_s_per_m": 20.0,
+}
+"""A grid with few B, as there are many maps; both estimators have a boundary there on the paper's device and drive."""
+AROUND = 0.7, 0.85, 0.95, 1 / 0.95, 1 / 0.85, 1 / 0.7
+"""The stiffness of the walls that are timed, over the reference's boundary, from one B to the next."""
+Wall = tuple[float, float]
+"""The stiffness K (N/m) and the damping B (N s/m) of a wall."""
 
 
 @dataclass(frozen=True)
@@ -169,3 +187,62 @@ def _scatter(scene: Scene) -> list[Shortcut]:
 def _together(one: Shortcut, other: Shortcut) -> Shortcut:
     label, changes = f"{one.label} + {other.label}", one.changes | other.changes
     return Shortcut("two at once", label, changes, coarser=one.coarser * other.coarser)
+
+
+class Contest:
+    """A scene, its shortcuts, and the estimators with which the shortcuts are tried.
+
+    Attributes:
+        scene: the scene, with the grid of the maps.
+        curves: the estimators, labelled as on the command line.
+        shortcuts: all shortcuts; `computed` are those of a model, `hardware` those of the RTL.
+        refused: why the scene does not take a shortcut, by its label.
+    """
+
+    def __init__(self, case: Case):
+        self._case = case.with_defaults(GRID)
+        self.scene = self._case.scene
+        self._grid = grid_of(self.scene)
+        if len(self._grid.dampings) < 2:
+            key = f"{self.scene.name}: zwidth.damping_to_n_s_per_m"
+            raise SceneError(f"{key} must leave two values of B, for a map of one has no area")
+        self.refused: dict[str, str] = {}
+        self.curves = [replace(methods(self.scene)[method], label=method) for method in METHODS]
+        self.shortcuts = shortcuts(self.scene, self._differs)
+        self.computed = [each for each in self.shortcuts if each.backend != "rtl"]
+        self.hardware = [each for each in self.shortcuts if each.backend == "rtl"]
+
+    def _differs(self, shortcut: Shortcut) -> bool:
+        """Return whether a shortcut is valid for the scene, and differs from the reference."""
+        reference = [self.case_of(REFERENCE, curve).scene for curve in self.curves]
+        try:
+            own = [self.case_of(shortcut, curve).scene for curve in self.curves]
+        except SceneError as error:
+            self.refused[shortcut.label] = str(error).removeprefix(f"{self._case.source}: ")
+            return False
+        return own != reference or shortcut.backend != REFERENCE.backend or shortcut.coarser > 1
+
+    def case_of(self, shortcut: Shortcut, curve: Curve) -> Case:
+        """Return the case of a shortcut with an estimator."""
+        changes = curve.changes | shortcut.changes
+        if shortcut.coarser > 1:
+            changes["zwidth.stiffness_step_n_per_m"] = shortcut.coarser * self._grid.stiffness_step_n_per_m
+        return self._case.changed(changes, curve.label)
+
+    def model_of(self, shortcut: Shortcut) -> Shortcut:
+        """Return the shortcut that computes the verdicts of another: itself, or the model of the hardware."""
+        if shortcut.backend != "rtl":
+            return shortcut
+        return next(each for each in self.computed if (each.backend, each.changes) == ("fixed", shortcut.changes))
+
+    def timed(self, boundary: dict[float, float]) -> list[Wall]:
+        """Return the walls that are timed: one for every B of a boundary, at varying distances from it."""
+        step, walls = self._grid.stiffness_step_n_per_m, []
+        for (damping, stiffness), times in zip(boundary.items(), cycle(AROUND), strict=False):
+            row = round(times * (stiffness / step + 0.5))
+            walls.append((min(max(row, 1), self._grid.rows) * step, damping))
+        return walls
+
+    def hit(self, shortcut: Shortcut, curve: Curve, wall: Wall, until_sure: bool = True) -> hit.Hit:
+        """Hit a wall with a shortcut and an estimator."""
+        return hit.run(self.case_of(shortcut, curve).hitting(*wall), shortcut.backend, until_sure=until_sure)

@@ -17,9 +17,10 @@ from ..walls.coupled_theory import loop_of
 from ..walls.figure_5 import Fact, with_shares
 from ..walls.grid import grid_of
 from ..walls.likelihood import Wall
+from ..walls.mapping import Effort, Mapper
 from ..walls.methods import Curve, methods
 from ..walls.starts import start
-from ..walls.zwidth import Effort, Map, Mapper
+from ..walls.zwidth import Map
 
 WORST = "worst hand, at B"
 WORST_SAYS = f"{WORST}: with which the fewest hits are stable of the walls on both sides of the edge"

@@ -32,7 +32,7 @@ class Wall:
 
     Attributes:
         damping_n_s_per_m, stiffness_n_per_m: B and K.
-        hits: what `zwidth.verdict` returned, by the number of the start.
+        hits: what `mapping.verdict` returned, by the number of the start.
     """
 
     damping_n_s_per_m: float

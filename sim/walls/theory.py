@@ -26,8 +26,8 @@ from ..world.device import Device, equations
 LINEAR = ("fdm", "butterworth")
 """Estimators with a known exact boundary."""
 ANGLES = np.linspace(1e-5, np.pi, 20_001)
-SEARCH = 100
-"""Number of stiffnesses, spaced evenly in their logarithm, in the search for the first unstable one."""
+SEARCHED_N_PER_M = np.geomspace(1.0, 1e8, 100)
+"""The stiffnesses among which the first unstable one is searched for."""
 
 
 def delay_s(scene: Scene) -> float:
@@ -174,22 +174,21 @@ class Loop:
         return float(np.abs(np.linalg.eigvals(self._after_first @ updated)).max())
 
 
-def linear_limit_n_per_m(loop: Loop, damping_n_s_per_m: float, least: float = 1.0, most: float = 1e8) -> float:
+def linear_limit_n_per_m(loop: Loop, damping_n_s_per_m: float) -> float:
     """Return the stiffness (N/m) at which the linear loop with a wall's damping first becomes unstable.
 
     Args:
         loop: the loop of a scene, without its sticking friction and quantisation.
         damping_n_s_per_m: damping of the wall.
-        least, most: the range of the search, N/m.
 
     Returns:
         That stiffness, refined between two neighbours of a search: stable islands above it, and unstable islands
         between two neighbours, are not searched for. 0 if even the least is unstable, infinite if none is found.
     """
-    stable = least
-    for stiffness in np.geomspace(least, most, SEARCH):
+    stable = SEARCHED_N_PER_M[0]
+    for stiffness in SEARCHED_N_PER_M:
         if loop.radius(stiffness, damping_n_s_per_m) >= 1:
-            if stiffness == least:
+            if stiffness == stable:
                 return 0.0
             return scipy.optimize.brentq(lambda k: loop.radius(k, damping_n_s_per_m) - 1, stable, stiffness, rtol=1e-9)
         stable = stiffness

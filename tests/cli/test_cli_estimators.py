@@ -7,8 +7,8 @@ import signal
 
 import pytest
 
-from hardwall.cli import accuracy as commands
 from hardwall.model.runtime.build_folder import build_dir
+from hardwall.sim.studies import accuracy
 from stimuli.lengths import LONG
 from support.command_line import call
 from support.processes import HARDWALL, ended_by, session, started, stored, wait_until
@@ -140,7 +140,7 @@ def test_a_recording_that_cannot_be_taken_is_refused_before_any_work(
     rows = (f"{number / 1000:.3f},{number % 2 * high}\n" for number in range(3000))
     (tmp_path / "made.csv").write_text("time_s,c\n" + "".join(rows))
     for name in ("measure", "measure_recording"):
-        monkeypatch.setattr(f"hardwall.cli.accuracy.{name}", lambda **_: pytest.fail("it measures"))
+        monkeypatch.setattr(f"hardwall.sim.studies.accuracy.{name}", lambda **_: pytest.fail("it measures"))
     signals = ("--signal", "paper", "--signal", "made.csv:c")
     code, out, err = call(
         monkeypatch, capsys, "accuracy", *signals, "--rates", "1e4", "--estimators", estimators, "--workers", 1
@@ -152,7 +152,7 @@ def test_a_recording_that_cannot_be_taken_is_refused_before_any_work(
 
 def test_a_recording_that_changes_meanwhile_counts_as_it_was_read(monkeypatch, capsys, tmp_path, fresh):
     """What is stored under the digest of a file is of the bytes with that digest."""
-    file, plan = tmp_path / "made.csv", commands.plan
+    file, plan = tmp_path / "made.csv", accuracy.plan
 
     def recorded(height: int) -> str:
         rows = (f"{number / 1000:.3f},{round(height * math.sin(number / 100))}\n" for number in range(3000))
@@ -170,7 +170,7 @@ def test_a_recording_that_changes_meanwhile_counts_as_it_was_read(monkeypatch, c
 
     file.write_text(recorded(3000))
     with monkeypatch.context() as patch:
-        patch.setattr(commands, "plan", planned)
+        patch.setattr(accuracy, "plan", planned)
         low = row()
     assert row()["acceleration_max_counts_s2"] > 2 * low["acceleration_max_counts_s2"]
     file.write_text(recorded(3000))

@@ -9,7 +9,7 @@ from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.load import load, read
 from hardwall.sim.walls import hit
 from hardwall.sim.walls.hit_rows import row_of
-from hardwall.sim.walls.zwidth import verdict
+from hardwall.sim.walls.mapping import verdict
 from hardwall.sim.world.converter import AS_IT_IS, Converter, Pulse
 from hardwall.sim.world.device import Device, Hand, Motor, Shunt, Transmission, train
 from hardwall.sim.world.rigid import Rigid

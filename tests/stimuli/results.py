@@ -14,7 +14,7 @@ from hardwall.sim.scene.tables import load_any
 from hardwall.sim.studies import axes, bits, costs, cutoff, drop, gains, lipschitz, rates, shortcuts, sines, trade
 from hardwall.sim.studies.accuracy import Accuracy
 from hardwall.sim.studies.drop_result import Drop, End, Law, Shaken
-from hardwall.sim.studies.rendered_result import Moving, Rendered
+from hardwall.sim.studies.rendered import Moving, Rendered
 from hardwall.sim.studies.rendered_setting import Setting
 from hardwall.sim.studies.zwidth import ZWidth
 from hardwall.sim.walls import theory
@@ -23,8 +23,9 @@ from hardwall.sim.walls.chatter import Chatter
 from hardwall.sim.walls.edge_shift import Move
 from hardwall.sim.walls.hit import Hit
 from hardwall.sim.walls.hit_axes import AxesHit
+from hardwall.sim.walls.mapping import Effort
 from hardwall.sim.walls.methods import methods
-from hardwall.sim.walls.zwidth import Effort, Map
+from hardwall.sim.walls.zwidth import Map
 
 NOTHING = Effort("fixed", 0, 0.0)
 
@@ -68,7 +69,7 @@ def hit_axes() -> AxesHit:
 
 
 def verdict(stable: bool) -> dict:
-    """Return a verdict on a wall, as that of `hardwall.sim.walls.zwidth`."""
+    """Return a verdict on a wall, as that of `hardwall.sim.walls.mapping`."""
     said = {"verdict": "stable" if stable else "unstable", "in_place": stable}
     return said | dict.fromkeys(("rms_mm", "offset_mm", "drift_mm_per_s", "run_s", "seconds"), 0.0)
 

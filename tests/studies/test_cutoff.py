@@ -108,7 +108,7 @@ def verdict(changes: dict, wall: tuple[float, float], **_) -> dict:
 
 
 def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", verdict)
+    monkeypatch.setattr("hardwall.sim.walls.mapping.verdict", verdict)
     picture = tmp_path / "cutoff.svg"
     few = "--set", "zwidth.damping_step_n_s_per_m=111.0"
     code, out, _ = call(monkeypatch, capsys, "cutoff", "seed-2011", *few, "--workers", 1, "--json", "--plot", picture)
@@ -131,7 +131,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
         "no filter: 0",
     )
     assert [label for label in wanted if label not in text] == []
-    monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", None)
+    monkeypatch.setattr("hardwall.sim.walls.mapping.verdict", None)
     code, out, _ = call(monkeypatch, capsys, "cutoff", "seed-2011", *few, "--workers", 1, "--resume")
     assert code == 0
     assert f"{max(areas.values()) / 1e3:.0f}+" in out

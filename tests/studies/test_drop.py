@@ -12,8 +12,9 @@ from hardwall.sim.studies import drop
 from hardwall.sim.studies.drop_result import Drop, Law
 from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.chatter import Chatter
+from hardwall.sim.walls.mapping import Effort
 from hardwall.sim.walls.methods import methods
-from hardwall.sim.walls.zwidth import Effort, Map
+from hardwall.sim.walls.zwidth import Map
 from stimuli import results
 from stimuli.scenes import ODD
 from support.command_line import call
@@ -66,7 +67,7 @@ def test_the_chatter_shakes_the_handle_where_the_force_sees_both_sides_of_it():
 def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr("hardwall.sim.studies.drop.strike", strike)
     monkeypatch.setattr("hardwall.sim.studies.drop.at_rest", at_rest)
-    monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", verdict)
+    monkeypatch.setattr("hardwall.sim.walls.mapping.verdict", verdict)
     picture = tmp_path / "drop.svg"
     code, out, err = call(monkeypatch, capsys, "drop", "--workers", 1, "--json", "--plot", picture)
     assert code == 0
@@ -107,7 +108,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
         text = path.read_text()
         assert [label for label in labels if label not in text] == []
     monkeypatch.setattr("hardwall.sim.studies.drop.strike", None)
-    monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", None)
+    monkeypatch.setattr("hardwall.sim.walls.mapping.verdict", None)
     code, out, _ = call(monkeypatch, capsys, "drop", "--workers", 1, "--resume")
     assert code == 0
     assert "Coulomb friction x 2" in out

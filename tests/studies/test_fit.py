@@ -12,7 +12,8 @@ from hardwall.sim.walls import methods
 from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.figure_5 import Fact
 from hardwall.sim.walls.grid import grid_of
-from hardwall.sim.walls.zwidth import Map, NeverReached
+from hardwall.sim.walls.mapping import NeverReached
+from hardwall.sim.walls.zwidth import Map
 from stimuli import results
 from stimuli.figure_5 import PAPER
 from stimuli.maps import Known
@@ -133,7 +134,7 @@ def verdict(changes: dict, wall: tuple[float, float], **_) -> dict:
 
 
 def test_report_and_table_and_what_is_known_is_not_hit_again(monkeypatch, capsys):
-    monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", verdict)
+    monkeypatch.setattr("hardwall.sim.walls.mapping.verdict", verdict)
     words = ["fit", "--axis", "3-30", "--evaluations", 24, "--workers", 1]
     code, out, _ = call(monkeypatch, capsys, *words, "--json")
     assert code == 0
@@ -144,7 +145,7 @@ def test_report_and_table_and_what_is_known_is_not_hit_again(monkeypatch, capsys
     assert len(of_axis["before"]["facts"]) == fit.NUMBER
     assert of_axis["finalists"][0]["score"] == min(each["score"] for each in of_axis["finalists"])
     assert set(of_axis["finalists"][0]["values"]) == set(fit.PARAMETERS)
-    monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", None)
+    monkeypatch.setattr("hardwall.sim.walls.mapping.verdict", None)
     code, out, _ = call(monkeypatch, capsys, *words, "--resume")
     assert code == 0
     assert "protocol.threshold_mm" in out

@@ -10,7 +10,7 @@ from hardwall.cli import rendered as command
 from hardwall.sim.estimates import hardness, impedance
 from hardwall.sim.scene.case import Case
 from hardwall.sim.studies import rendered
-from hardwall.sim.studies.rendered_result import Moving
+from hardwall.sim.studies.rendered import Moving
 from hardwall.sim.studies.rendered_setting import slow_hz
 from hardwall.sim.walls import theory
 from hardwall.sim.walls.methods import methods

@@ -8,10 +8,10 @@ import pytest
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.load import load
-from hardwall.sim.studies import trade_runs
-from hardwall.sim.studies.shortcuts import LACKED, REFERENCE, Shortcut, shortcuts
-from hardwall.sim.studies.trade import Point, Trade, best
-from hardwall.sim.studies.trade_runs import GRID, METHODS, study
+from hardwall.sim.studies import shortcuts as settings
+from hardwall.sim.studies.shortcuts import GRID, LACKED, METHODS, REFERENCE, Shortcut, shortcuts
+from hardwall.sim.studies.trade import Point, Trade, best, study
+from hardwall.sim.walls import hit
 from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.edge_shift import Move
 from hardwall.sim.walls.grid import grid_of
@@ -53,7 +53,7 @@ class Invented:
 def hardware(monkeypatch):
     """Hits of any backend take 5 s and have the same words."""
     monkeypatch.setattr(
-        trade_runs.hit, "run", lambda scene, backend, until_sure: SimpleNamespace(seconds=5.0, force_sha256="same")
+        hit, "run", lambda scene, backend, until_sure: SimpleNamespace(seconds=5.0, force_sha256="same")
     )
 
 
@@ -102,7 +102,7 @@ def test_the_hardware_has_the_verdicts_of_its_model(found):
 
 def test_other_force_words_are_a_failure(monkeypatch):
     monkeypatch.setattr(
-        trade_runs.hit, "run", lambda scene, backend, until_sure: SimpleNamespace(seconds=5.0, force_sha256=backend)
+        hit, "run", lambda scene, backend, until_sure: SimpleNamespace(seconds=5.0, force_sha256=backend)
     )
     with pytest.raises(RuntimeError, match=r"^the RTL and the model differ in their force words: rtl, "):
         study(Case.of("drive-2011"), Invented())
@@ -223,8 +223,8 @@ def test_the_command_prints_and_draws_real_hits(monkeypatch, capsys, tmp_path):
     few = (REFERENCE.label, "steps of 100 µs", "K in steps of 2", "scatter")
     every = shortcuts(load("seed-2011", GRID | SMALL), lambda _: True)
     kept = [each for each in every if each.label.startswith(few) and "+" not in each.label]
-    monkeypatch.setattr(trade_runs, "shortcuts", lambda scene, accepted: kept)
-    monkeypatch.setattr(trade_runs, "METHODS", ("fdm-500",))
+    monkeypatch.setattr(settings, "shortcuts", lambda scene, accepted: kept)
+    monkeypatch.setattr(settings, "METHODS", ("fdm-500",))
     picture = tmp_path / "trade.svg"
     set_ = [word for key, value in SMALL.items() for word in ("--set", f"{key}={value}")]
     order = ["trade", "seed-2011", *set_, "--workers", 1, "--starts", 5]
@@ -239,7 +239,7 @@ def test_the_command_prints_and_draws_real_hits(monkeypatch, capsys, tmp_path):
     text = picture.read_text()
     wanted = "steps of 100 µs", "in one process (s)", "area (of that with all parts)", "FDM + 500 Hz"
     assert [label for label in wanted if label not in text] == []
-    monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", None)
+    monkeypatch.setattr("hardwall.sim.walls.mapping.verdict", None)
     code, out, _ = call(monkeypatch, capsys, *order, "--resume")
     assert code == 0
     assert "steps of 100 µs" in out

@@ -27,7 +27,7 @@ from hardwall.sim.jobs import cluster, parallel, store
 from hardwall.sim.rtl import shared_library
 from hardwall.sim.scene import checks
 from hardwall.sim.studies import bench
-from hardwall.sim.walls import zwidth
+from hardwall.sim.walls import mapping
 
 LOADED = (
     *(scipy.linalg, scipy.optimize, scipy.signal),
@@ -76,7 +76,7 @@ def _shorten(folder: Path) -> None:
     """End this process where long work begins, and keep results in `folder`."""
     checks.SAMPLES_MAX, checks.STEPS_MAX, cluster.TIMEOUT_S = SAMPLES_MAX, STEPS_MAX, TIMEOUT_S
     parallel.run = _short(parallel.run)
-    bench.study = zwidth.run = shared_library.build = synth.synthesise = board.build = board.load_into = _begin
+    bench.study = mapping.run = shared_library.build = synth.synthesise = board.build = board.load_into = _begin
     virtual_bench.VirtualBench.connect = _begin
     store.build_dir = lambda: folder / "build"
 

@@ -14,7 +14,7 @@ from hardwall.sim.jobs.store import Store
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.hand_section import HANDS, HandSection
 from hardwall.sim.studies import zwidth as study
-from hardwall.sim.walls import worst_variant, zwidth
+from hardwall.sim.walls import mapping, worst_variant, zwidth
 from hardwall.sim.walls.boundary import STABLE, BoundaryPoint
 from hardwall.sim.walls.grid import grid_of
 from hardwall.sim.walls.likelihood import Wall
@@ -60,13 +60,13 @@ def asked(monkeypatch):
         found.append((hand_of(changes), tuple(wall), start))
         return results.verdict(stable(hand_of(changes), wall, start))
 
-    monkeypatch.setattr(zwidth, "verdict", verdict)
+    monkeypatch.setattr(mapping, "verdict", verdict)
     return found
 
 
 def mapped(case: Case, hands: tuple[str, ...]) -> list[zwidth.Map]:
     with Threads(1) as pool:
-        return zwidth.run(worst_variant.cases_of(case, hands), "fixed", Store("zwidth"), pool, starts=STARTS)
+        return mapping.run(worst_variant.cases_of(case, hands), "fixed", Store("zwidth"), pool, starts=STARTS)
 
 
 @pytest.fixture
@@ -119,7 +119,7 @@ def test_the_map_of_a_hand_is_that_of_its_scene_alone(case, asked):
     (alone,) = mapped(case, ("hogan-1989",))
     with Threads(1) as pool:
         held = [case.changed({"hand.model": "hogan-1989"})]
-        (again,) = zwidth.run(held, "fixed", Store("zwidth"), pool, starts=STARTS)
+        (again,) = mapping.run(held, "fixed", Store("zwidth"), pool, starts=STARTS)
     assert alone.boundary == again.boundary
     assert alone.report().keys() == again.report().keys()
     assert "hands" not in alone.report()
@@ -231,8 +231,8 @@ def test_real_hits_of_every_wall_of_a_grid_have_the_edge_of_the_map():
         wall = row * grid.stiffness_step_n_per_m, damping
         shares = dict.fromkeys(TWO, 0)
         for hand, start in product(TWO, range(STARTS)):
-            job = found.case.variants[hand].job() | {"sources": zwidth.store.sources(), "backend": "fixed"}
-            shares[hand] += zwidth.verdict(**job, wall=wall, start=start)["verdict"] == STABLE
+            job = found.case.variants[hand].job() | {"sources": mapping.store.sources(), "backend": "fixed"}
+            shares[hand] += mapping.verdict(**job, wall=wall, start=start)["verdict"] == STABLE
         least.append(min(shares.values()))
     (point,) = found.boundary
     below = max((row for row, each in enumerate(least, 1) if 2 * each >= STARTS), default=0)

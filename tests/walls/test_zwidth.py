@@ -15,8 +15,9 @@ from hardwall.sim.jobs import cluster
 from hardwall.sim.jobs.job_pool import Threads
 from hardwall.sim.jobs.store import Store
 from hardwall.sim.scene.case import Case
+from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.load import read
-from hardwall.sim.walls import methods, zwidth
+from hardwall.sim.walls import mapping, methods, zwidth
 from hardwall.sim.walls.boundary import BoundaryPoint
 from stimuli import results
 from stimuli.lengths import long_form
@@ -48,7 +49,7 @@ STARTS = 4
 def mapped(cases: list[Case], starts: int = STARTS) -> list[zwidth.Map]:
     """Return the maps of cases by one thread."""
     with Threads(1) as pool:
-        return zwidth.run(cases, "fixed", Store("zwidth"), pool, starts=starts)
+        return mapping.run(cases, "fixed", Store("zwidth"), pool, starts=starts)
 
 
 @pytest.fixture(scope="module")
@@ -60,20 +61,20 @@ def map_of_one_thread(tmp_path_factory):
 
 def test_a_worker_with_other_sources_is_refused():
     with pytest.raises(RuntimeError, match=r"has other sources of hardwall, or versions of its tools$"):
-        zwidth.verdict("seed-2011", read("seed-2011"), "0", {}, (1e3, 10.0), None, "fixed")
+        mapping.verdict("seed-2011", read("seed-2011"), "0", {}, (1e3, 10.0), None, "fixed")
 
 
 def test_two_workers_and_two_threads_give_the_map_of_one(map_of_one_thread):
     options = {"threads_per_worker": 1, "dashboard_address": ":0"}
     with LocalCluster(n_workers=2, **options) as local, cluster.connected(local.scheduler_address) as pool:
-        assert zwidth.run(CASES, "fixed", Store("zwidth"), pool, starts=STARTS) == map_of_one_thread
+        assert mapping.run(CASES, "fixed", Store("zwidth"), pool, starts=STARTS) == map_of_one_thread
     with Threads(2) as pool:
-        assert zwidth.run(CASES, "fixed", Store("zwidth"), pool, starts=STARTS) == map_of_one_thread
+        assert mapping.run(CASES, "fixed", Store("zwidth"), pool, starts=STARTS) == map_of_one_thread
 
 
 def test_a_map_goes_on_from_what_is_known(map_of_one_thread, monkeypatch):
     """A map that is ended after five hits and resumed hits none of the five again, and is the same."""
-    real, hits = zwidth.verdict, []
+    real, hits = mapping.verdict, []
 
     def counted(**job):
         if len(hits) == 5:
@@ -81,11 +82,11 @@ def test_a_map_goes_on_from_what_is_known(map_of_one_thread, monkeypatch):
         hits.append(job)
         return real(**job)
 
-    monkeypatch.setattr(zwidth, "verdict", counted)
+    monkeypatch.setattr(mapping, "verdict", counted)
     with pytest.raises(KeyboardInterrupt):
         mapped(CASES)
     before = list(hits)
-    monkeypatch.setattr(zwidth, "verdict", lambda **job: hits.append(job) or real(**job))
+    monkeypatch.setattr(mapping, "verdict", lambda **job: hits.append(job) or real(**job))
     assert mapped(CASES) == map_of_one_thread
     assert len(hits) == sum(each.hits for each in map_of_one_thread)
     assert all(job not in before for job in hits[5:])
@@ -107,8 +108,8 @@ def test_the_rtl_gives_the_map_of_fixed(monkeypatch, capsys):
 
 def test_more_starts_hit_again_only_what_they_have_not(map_of_one_thread, monkeypatch):
     mapped(CASES, 2)
-    real, hits = zwidth.verdict, []
-    monkeypatch.setattr(zwidth, "verdict", lambda **job: hits.append(job) or real(**job))
+    real, hits = mapping.verdict, []
+    monkeypatch.setattr(mapping, "verdict", lambda **job: hits.append(job) or real(**job))
     assert mapped(CASES) == map_of_one_thread
     assert 0 < len(hits) < sum(each.hits for each in map_of_one_thread)
 
@@ -271,3 +272,10 @@ def test_the_columns_of_the_table_that_need_it_are_explained():
     columns = ["area", "of starts", "held", "in place", "to B", "islands", "undecided"]
     assert said[: len(columns)] == columns
     assert all(any(heading.startswith(word) for heading in headings) for word in columns)
+
+
+def test_a_scene_without_a_grid_is_refused_before_there_is_a_crew():
+    mapper = mapping.Mapper("fixed", 1, Store("zwidth"), pytest.fail, pytest.fail)
+    with pytest.raises(SceneError, match=r"^mhz: zwidth is missing"):
+        mapper("maps", [Case.of("mhz")])
+    assert mapper.effort()[:2] == ("fixed", 0)
