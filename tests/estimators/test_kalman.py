@@ -6,8 +6,8 @@ from fractions import Fraction
 import cocotb
 import numpy as np
 import pytest
-from brink import BRINKS, brink
 from filters import SECONDS, equals, impulse, norms, rms, run, starts_afresh
+from lowest_sums import BRINKS, brink
 from scipy.linalg import solve_discrete_are
 
 from hardwall.hdl.estimators.kalman import Estimator
