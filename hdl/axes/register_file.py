@@ -16,8 +16,8 @@ from ..link.checks import Bounds, Pulses, check_read
 from ..link.requests import Requests
 from ..wires import given, port
 from .at_address import At, Axes, at_address, refused
-from .cells import Cells
 from .commit_walk import CommitWalk
+from .register_cells import Cells
 
 
 def _given(design: Design) -> dict[str, ShapeLike]:

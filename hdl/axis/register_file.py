@@ -13,8 +13,8 @@ from ..arithmetic.fixed import less, shape
 from ..link.checks import Bounds, Pulses, check_read
 from ..link.requests import Requests
 from ..wires import port, ports
-from .cells import Cells
-from .moves import Moves
+from .register_cells import Cells
+from .register_transfers import Transfers
 
 SWEPT = CELL_BITS + 4
 """Clocks that a snapshot takes for a cell."""
@@ -174,7 +174,7 @@ class RegisterFile(wiring.Component):
             self._capture(m, cells)
         pulses.begin(m, host)
         bounds = self._bounds(m, at, cells.shift)
-        moves = Moves(m, self, cells)
+        moves = Transfers(m, self, cells)
         cells.take(m, host.value, moves.turned)
         with m.FSM():
             self._boot(m, cells)
@@ -248,7 +248,7 @@ class RegisterFile(wiring.Component):
             with m.If(step.all()):
                 m.next = "IDLE"
 
-    def _begin(self, m: Module, at: At, cells: Cells, pulses: Pulses, moves: Moves) -> None:
+    def _begin(self, m: Module, at: At, cells: Cells, pulses: Pulses, moves: Transfers) -> None:
         """Add the state that begins an operation."""
         design, host, below = self._design, self.host, at.below
         with m.State("IDLE"):

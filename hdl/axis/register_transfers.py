@@ -9,10 +9,10 @@ from hardwall.model.axis.registers import ACTIVE, EDGE_STAMPS, WRITTEN
 
 from ..link.line import UNMIXED
 from ..wires import names_of, port, ports
-from .cells import Cells
+from .register_cells import Cells
 
 
-class Moves:
+class Transfers:
     """The chain: the bits of status that wait for their cells, or the words at their ports.
 
     The bits of a stamp are those of a number that is 1 too high: `borrow` takes it off, bit by bit.
