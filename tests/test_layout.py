@@ -245,6 +245,25 @@ def test_hardware_finds_ports_by_their_names_in_one_place():
     assert {identity(path) for path in sources if calls.search(path.read_text(encoding="utf-8"))} == {"hdl/wires"}
 
 
+@pytest.mark.parametrize("path", sorted((ROOT / "model/runtime").glob("*.py")), ids=identity)
+def test_the_runtime_is_of_no_room(path):
+    assert {name for name in of(set(imports(path)), "hardwall") if not of({name}, "hardwall.model.runtime")} == set()
+
+
+def test_an_import_of_the_model_touches_no_folder_and_asks_for_no_home():
+    program = (
+        "import os, sys; sys.dont_write_bytecode = True\n"
+        "def barred(event, arguments):\n"
+        "    writes = event == 'open' and arguments[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT)\n"
+        "    if writes or event in ('os.mkdir', 'os.rename', 'os.remove'): raise SystemExit(f'{event} {arguments}')\n"
+        "import pathlib; pathlib.Path.home = None\n"
+        "sys.addaudithook(barred)\n"
+        "from hardwall.model import spec, stamped, axis, register_texts"
+    )
+    done = subprocess.run([sys.executable, "-c", program], env={}, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_the_model_needs_only_numpy_and_numba():
     modules = sorted(name for name in MODULES if name.startswith("hardwall.model"))
     program = f"import sys, {', '.join(modules)}; print(*sys.modules)"
