@@ -64,7 +64,7 @@ all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the l
 	@printf '%s\n' $(PICTURES)
 
 # The longer campaigns, of a pytest of one's own and of what draws mutants or counts coverage, are its default.
-test: export HARDWALL_SAMPLES ?= 5000
+test: export HARDWALL_SAMPLES ?= 12500
 test: $(VENV)/.test | tools ## every regression: the model against exact arithmetic, the RTL against the model
 	@$(PYTEST) $(if $(CI),--junitxml build/junit.xml) $(ARGS)
 

@@ -47,7 +47,7 @@ def test_help_lists_every_task(tree):
 
 def test_what_runs_from_the_tests_folder_has_the_tests_tools():
     rules = re.findall(r"^(\w+): (.*)\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(), re.M)
-    runs = {task: needs for task, needs, recipe in rules if re.search(r"tests/|\$\(PYTEST\)", recipe)}
+    runs = {task: needs for task, needs, recipe in rules if re.search(r"tests/|\$\((PYTEST|IN_TESTS)\)", recipe)}
     assert {"test", "prove", "faults", "gate", "coverage", "mutate", "digests"} <= set(runs)
     assert [task for task, needs in runs.items() if "$(VENV)/.test" not in needs.split()] == []
 

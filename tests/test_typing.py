@@ -17,10 +17,11 @@ import numpy as np
 
 from hardwall.model import stamped
 from hardwall.model.arithmetic.fixed import SQ
-from hardwall.model.axis import Axis, Record, step
+from hardwall.model.axis import Axis, step
+from hardwall.model.axis.axis import Record
 from hardwall.model.estimators import registry
 from hardwall.model.estimators.levant import Gains
-from hardwall.model.quadrature import Seen, seen_count
+from hardwall.model.encoder.quadrature import Seen, seen_count
 from hardwall.model.spec import AxisSpec
 from hardwall.model.words import Word
 
@@ -48,7 +49,7 @@ reveal_type(SQ(3, 2).max)
 SHOWN = [
     r"numpy\.ndarray\[.*\]",
     r"numpy\.ndarray\[.*\]",
-    r"tuple\[.*fallback=hardwall\.model\.design\.State\]",
+    r"tuple\[.*fallback=hardwall\.model\.axis\.design\.State\]",
     r"float",
     r"hardwall\.model\.estimators\.estimate\.EstimatorDesign",
     r"int",

@@ -15,7 +15,7 @@ from hardwall.model.runtime import build_folder, kernel_cache, provenance
 
 ROOT = Path(__file__).absolute().parents[2]
 KERNEL = """
-from hardwall.model.compiled import compiled
+from hardwall.model.runtime.compiled import compiled
 from constants_of_a_study import FACTOR
 
 @compiled
@@ -25,8 +25,8 @@ def scaled(number):
 WALL_IMPORT = "from hardwall.model.axis.wall import render"
 LAW = """
 from typing import NamedTuple
-from hardwall.model.compiled import compiled
-from hardwall.model.wall import render
+from hardwall.model.runtime.compiled import compiled
+from hardwall.model.axis.wall import render
 
 class Law(NamedTuple):
     stiffness: float
@@ -198,7 +198,7 @@ def test_two_processes_that_keep_at_once_never_mix_their_variants(tmp_path, monk
 
 
 WALL = """
-from hardwall.model.wall import Params, render
+from hardwall.model.axis.wall import Params, render
 print(render(Params(**dict.fromkeys(Params._fields, 0) | {"stiffness": 2, "force_max": 99}), 21, 0))
 """
 

@@ -12,7 +12,7 @@ from support.processes import ended, ended_by, line, session, started, wait_unti
 PROGRAM = """
 import sys, time
 from pathlib import Path
-from hardwall.model.whole_file import whole_file
+from hardwall.model.runtime.whole_file import whole_file
 from hardwall.model.runtime import termination
 termination.hear_signals()
 termination.go_on_by("--resume goes on from there")

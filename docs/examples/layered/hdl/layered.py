@@ -6,8 +6,8 @@ from amaranth.lib.wiring import Member
 from hardwall.model.layered import Design
 
 from .arithmetic.fixed import saturate
+from .axis.wall import Wall
 from .block import Block
-from .wall import Wall
 
 
 class Layered(Block):

@@ -13,10 +13,10 @@ than half of the count's range away from the core, and a core never pushes in fr
 
 from typing import NamedTuple
 
-from . import wall
 from .arithmetic.fixed import SQ, UQ, bits_for, saturate, wrap
-from .compiled import compiled
-from .wall import render
+from .axis import wall
+from .axis.wall import render
+from .runtime.compiled import compiled
 from .words import Word
 
 LATENCY = wall.LATENCY + 1

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..arithmetic.fixed import SQ, bits_for, saturate, wrap
-from ..compiled import compiled
 from ..requirements import AxisRequirements
+from ..runtime.compiled import compiled
 from .estimate import EstimatorDesign, EstimatorGains, estimate
 
 
