@@ -101,9 +101,10 @@ def test_a_command_that_is_not_run_is_accepted(words):
 def test_the_api_has_every_module_of_the_model():
     shown = {name for page in ("docs/api.md", "docs/api-estimators.md") for name in _modules_on(page)}
     paths = [path.relative_to(ROOT).with_suffix("") for path in (ROOT / "model").rglob("*.py")]
-    # What is in runtime/ is no model, and for nobody to import.
+    # What is in runtime/ is no model; what a block of one's own needs of it is shown.
     modules = {".".join(("hardwall", *path.parts)) for path in paths if path.stem != "__init__"}
-    assert shown == {name for name in modules if not name.startswith("hardwall.model.runtime.")}
+    assert shown <= modules
+    assert {name for name in modules - shown if not name.startswith("hardwall.model.runtime.")} == set()
 
 
 PICTURES = sorted((ROOT / "docs/pictures").iterdir())
