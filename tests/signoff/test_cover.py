@@ -123,7 +123,7 @@ def test_bits_that_miss_the_same_are_listed_together():
 def test_every_block_has_its_test_and_every_reason_its_block():
     tests = {file for file in TESTS.rglob("test_*.py") if re.search(r"^    simulate\(__file__", file.read_text(), re.M)}
     assert {block.test for block in BLOCKS} == tests - OF_THE_BENCH
-    hdl = Path(axis.__file__).parent
+    hdl = Path(axis.__file__).parents[1]
     assert [block.name for block in BLOCKS if not (hdl / f"{block.name}.py").exists()] == []
     written = sum(len(reasons_for(block.name, REASONS)) for block in BLOCKS)
     text = REASONS.read_text(encoding="utf-8")

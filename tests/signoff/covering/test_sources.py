@@ -99,7 +99,9 @@ def test_nothing_is_imported_that_is_no_source(name):
 
 
 def test_estimators_are_sources_of_the_tests_that_name_them():
-    axis, small = ({*sources_of(TESTS / f"{name}.py")} for name in ("test_axis", "estimators/test_finite_difference"))
+    axis, small = (
+        {*sources_of(TESTS / f"{name}.py")} for name in ("axis/test_axis", "estimators/test_finite_difference")
+    )
     edge, plain, other = (REGISTRY.with_name(f"{name}.py") for name in ("levant_edge", "levant", "mt"))
     assert {edge, plain} <= axis
     # The specification's own choice is one of any axis.
@@ -111,7 +113,7 @@ def test_estimators_are_sources_of_the_tests_that_name_them():
 
 
 def test_a_small_block_does_not_come_from_the_models_of_large_ones():
-    small, large = ({*sources_of(TESTS / f"{name}.py")} for name in ("arithmetic/test_sqrt", "test_board"))
+    small, large = ({*sources_of(TESTS / f"{name}.py")} for name in ("arithmetic/test_sqrt", "axis/test_board"))
     assert Path("model/arithmetic/sqrt.py") in small
     assert Path("model/axis/supervisor.py") in large - small
     assert not any(file.is_relative_to(place) for file in small | large for place in (HARDWARE, RUNNER))
