@@ -307,7 +307,7 @@ def test_the_sizes_of_a_block_are_those_that_its_tests_simulate():
 
 def test_a_block_is_mutated_in_its_own_modules():
     modules = {block.name: modules_of(block) for block in BLOCKS}
-    assert modules["wall"] == (f"{BLOCK}.law",)
+    assert modules["axis/wall"] == (f"{BLOCK}.law",)
     assert modules["link/uart"] == (f"{BLOCK}.receiver", f"{BLOCK}.transmitter")
 
 
@@ -367,10 +367,10 @@ def test_the_command_ends_in_a_line_for_a_script(fates, last, monkeypatch, capsy
 
     def came(blocks, *_):
         given.extend(block.name for block in blocks)
-        return [Result("wall", fates, [])]
+        return [Result("axis/wall", fates, [])]
 
     monkeypatch.setattr(mutate, "run", came)
-    code = mutate.main("wal")
-    assert given == ["wall"]
+    code = mutate.main("axis/wal")
+    assert given == ["axis/wall"]
     assert capsys.readouterr().out.splitlines()[-1] == last
     assert code == int(EQUAL not in fates)
