@@ -274,7 +274,7 @@ def digest() -> str:
 
 
 def test_the_same_without_compilation():
-    code = "import test_quadrature; print(test_quadrature.digest())"
+    code = "from encoder import test_quadrature; print(test_quadrature.digest())"
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(Path(__file__).parents[1])}
     plain = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     assert plain.stdout.strip() == digest()
