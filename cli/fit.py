@@ -8,7 +8,7 @@ from ..sim.scene.case import Case
 from ..sim.studies import fit
 from ..sim.walls.methods import methods
 from .drop import refuse_methods_and_walls
-from .maps import mapper_of_one_crew
+from .maps import mapper_of_one_pool
 from .options import ModelOption, StartsOption
 from .scenes import SceneArgument, refuse
 from .study import StudyOptions, study
@@ -34,7 +34,7 @@ def command(
     refuse_methods_and_walls(changes)
     refuse(changes, ("zwidth",), "its maps go a little beyond the paper's axes")
     case = Case.of(scene, changes)
-    with mapper_of_one_crew(options, backend, starts, len(methods())) as mapper:
+    with mapper_of_one_pool(options, backend, starts, len(methods())) as mapper:
         for each in [reading] if reading else fit.READINGS:
             with progress(f"{case.scene.name}, B axis {each}", evaluations) as advance:
                 fits.append(fit.study(case, each, evaluations, seed, mapper, advance))

@@ -15,22 +15,22 @@ from .terminal import progress
 def mapper_of(options: StudyOptions, backend: str, starts: int) -> Mapper:
     """Return what makes maps; raise BadInput if no cluster can be what the options ask for."""
     _check_cluster(options)
-    crew = partial(pool_of, workers=options.workers, scheduler=options.scheduler)
-    return Mapper(backend, starts, Store("zwidth", options.resume), crew, progress)
+    pool_for = partial(pool_of, workers=options.workers, scheduler=options.scheduler)
+    return Mapper(backend, starts, Store("zwidth", options.resume), pool_for, progress)
 
 
 @contextmanager
-def mapper_of_one_crew(options: StudyOptions, backend: str, starts: int, cases: int) -> Iterator[Mapper]:
-    """Provide what makes very many maps, of so many cases at a time, without progress bars of their own; the crew stays
+def mapper_of_one_pool(options: StudyOptions, backend: str, starts: int, cases: int) -> Iterator[Mapper]:
+    """Provide what makes very many maps, of so many cases at a time, without progress bars of their own; the pool stays
     the same.
 
     Raises:
         BadInput: if no cluster can be what the options ask for.
     """
     _check_cluster(options)
-    with pool_of(cases * starts, options.workers, options.scheduler) as crew:
+    with pool_of(cases * starts, options.workers, options.scheduler) as pool:
         known = Store(options.command, options.resume)
-        yield Mapper(backend, starts, known, lambda _: nullcontext(crew), lambda *_: nullcontext())
+        yield Mapper(backend, starts, known, lambda _: nullcontext(pool), lambda *_: nullcontext())
 
 
 def _check_cluster(options: StudyOptions) -> None:

@@ -174,17 +174,17 @@ class RegisterFile(wiring.Component):
             self._capture(m, cells)
         pulses.begin(m, host)
         bounds = self._bounds(m, at, cells.shift)
-        moves = Transfers(m, self, cells)
-        cells.take(m, host.value, moves.turned)
+        transfers = Transfers(m, self, cells)
+        cells.take(m, host.value, transfers.turned)
         with m.FSM():
             self._boot(m, cells)
-            self._begin(m, at, cells, pulses, moves)
+            self._begin(m, at, cells, pulses, transfers)
             self._read(m, cells)
             most = [cells.place.eq(at.below), cells.area.eq(Area.MOST), cells.fetched.eq(1)]
             bounds.add_states(m, host, most, [cells.fetched.eq(1)])
             self._write(m, at, cells)
             self._give_pulses(m, pulses)
-            moves.add_states(m, pulses.marked("commit"))
+            transfers.add_states(m, pulses.marked("commit"))
             with m.State("DONE"):
                 m.d.comb += host.done.eq(1)
                 m.next = "IDLE"
@@ -248,12 +248,12 @@ class RegisterFile(wiring.Component):
             with m.If(step.all()):
                 m.next = "IDLE"
 
-    def _begin(self, m: Module, at: At, cells: Cells, pulses: Pulses, moves: Transfers) -> None:
+    def _begin(self, m: Module, at: At, cells: Cells, pulses: Pulses, transfers: Transfers) -> None:
         """Add the state that begins an operation."""
         design, host, below = self._design, self.host, at.below
         with m.State("IDLE"):
             m.d.comb += [cells.place.eq(below), cells.window.eq(host.address[14])]
-            m.d.sync += moves.committing.eq(0)
+            m.d.sync += transfers.committing.eq(0)
             with m.If(host.start), m.Switch(host.operation):
                 with m.Case(Operation.CHECK_READ):
                     check_read(m, self, ~(at.in_book | at.in_map | at.in_capture) | at.half, at.in_capture)
@@ -276,7 +276,7 @@ class RegisterFile(wiring.Component):
                     m.d.sync += cells.step.eq(design.registers.active[0].address + 1)
                     m.next = "PULSE"
                     with m.If(Cat(pulses.marked(name) for name in WITH_WORDS).any()):
-                        m.d.sync += moves.committing.eq(1)
+                        m.d.sync += transfers.committing.eq(1)
                         m.next = "COPY"
                 with m.Case(Operation.SNAPSHOT):
                     m.d.sync += cells.step.eq(design.turns[0][1][0].address + 1)

@@ -43,7 +43,7 @@ class Mapper:
         backend: one of `backends.BACKENDS`.
         starts: number of starts of a map.
         known: the store of verdicts.
-        crew: returns a context with the pool that does so many jobs at a time.
+        pool_for: returns a context with the pool that does so many jobs at a time.
         progress: returns a context with what is told the number of maps done, by a title and the number of maps.
     """
 
@@ -52,11 +52,11 @@ class Mapper:
         backend: str,
         starts: int,
         known: store.Store,
-        crew: Callable[[int], AbstractContextManager[JobPool]],
+        pool_for: Callable[[int], AbstractContextManager[JobPool]],
         progress: Callable[[str, int], AbstractContextManager[Callable[[float], None] | None]],
     ):
         self._backend, self._starts, self._known = backend, starts, known
-        self._crew, self._progress = crew, progress
+        self._pool_for, self._progress = pool_for, progress
         self._hits, self._began = 0, time.perf_counter()
 
     def __call__(self, title: str, cases: list[Case]) -> list[Map]:
@@ -68,7 +68,7 @@ class Mapper:
         for case in cases:
             grid_of(case.scene)  # raises SceneError before a cluster is started
         with (
-            self._crew(len(cases) * self._starts) as pool,
+            self._pool_for(len(cases) * self._starts) as pool,
             self._progress(f"{title}, {self._backend}", len(cases)) as advance,
         ):
             maps = run(cases, self._backend, self._known, pool, advance, self._starts)

@@ -274,7 +274,7 @@ def test_the_columns_of_the_table_that_need_it_are_explained():
     assert all(any(heading.startswith(word) for heading in headings) for word in columns)
 
 
-def test_a_scene_without_a_grid_is_refused_before_there_is_a_crew():
+def test_a_scene_without_a_grid_is_refused_before_there_is_a_pool():
     mapper = mapping.Mapper("fixed", 1, Store("zwidth"), pytest.fail, pytest.fail)
     with pytest.raises(SceneError, match=r"^mhz: zwidth is missing"):
         mapper("maps", [Case.of("mhz")])
