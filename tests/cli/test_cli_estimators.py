@@ -2,7 +2,6 @@
 
 import json
 import math
-import re
 import signal
 
 import pytest
@@ -10,18 +9,13 @@ import pytest
 from hardwall.model.runtime.build_folder import build_dir
 from hardwall.sim.studies import accuracy
 from stimuli.lengths import LONG
-from support.command_line import call
+from support.command_line import call, said
 from support.processes import HARDWALL, ended_by, session, started, stored, wait_until
 
 KEYS = {
     "estimator", "output", "backend", "sample_hz", "signal", "rms_mm_s", "max_mm_s", "delay_s", "chatter_mm_s",
 }  # fmt: skip
 SHORT = ["--estimators", "fdm,levant:u1", "--rates", "1e3,2000"]
-
-
-def said(err: str) -> list[str]:
-    """Return the lines of stderr, without those that a slow machine has: what is compiled, and how far the work is."""
-    return [line for line in err.splitlines() if not re.match(r"compiling the loop, once|accuracy, \w+: \d+%$", line)]
 
 
 def test_rows_as_json_and_as_a_table(monkeypatch, capsys):

@@ -1,5 +1,7 @@
 """The command line, called in this process."""
 
+import re
+
 from hardwall.cli import app
 
 from .reports import check_text
@@ -25,3 +27,8 @@ def call(monkeypatch, capsys, *arguments: object) -> tuple[int, str, str]:
     else:
         assert [line for line in out.splitlines() if len(line) > WIDTH] == [], "a table does not fit"
     return code, out, err
+
+
+def said(err: str) -> list[str]:
+    """Return the lines of stderr, without those that a slow machine has: what is compiled, and how far the work is."""
+    return [line for line in err.splitlines() if not re.match(r"compiling the loops?, once|accuracy, \w+: \d+%$", line)]
