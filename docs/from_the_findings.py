@@ -93,12 +93,12 @@ TABLES: dict[str, Callable[[dict[str, Any]], list[str]]] = {
 
 def told(task: str) -> str:
     """Return the table of what a task has kept."""
-    file = FINDINGS / f"{task}.json"
-    if not file.exists():
-        log.warning("nothing is kept of make %s: %s is not there", task, file.name)
+    files = [json.loads(file.read_text(encoding="utf-8")) for file in (FINDINGS / task).rglob("*.json")]
+    if not files:
+        log.warning("nothing is kept of make %s", task)
         return ""
-    kept = json.loads(file.read_text(encoding="utf-8"))
-    return "\n".join(TABLES[task]({name: each["found"] for name, each in kept.items()}))
+    kept = sorted((name, each["found"]) for file in files for name, each in file.items())
+    return "\n".join(TABLES[task](dict(kept)))
 
 
 def fill(_: Sphinx, __: str, source: list[str]) -> None:

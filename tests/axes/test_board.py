@@ -20,6 +20,7 @@ from oracles.axes_board import RECORDS, Host, Sample, Watched
 from oracles.returning_clock import check_returns
 from oracles.supervised import SYNCHRONISER
 from stimuli import frames
+from stimuli.lengths import WHOLE
 
 BITS = {cause.name: 1 << bit for bit, cause in enumerate(CAUSES)}
 PLACES = -3, 11
@@ -363,7 +364,7 @@ async def a_loop_stops_every_axis(dut):
     assert host.compared > 10_000
 
 
-@cocotb.test()
+@cocotb.test(skip=not WHOLE)
 async def one_frame_arms_commits_preloads_or_shifts_the_origin(dut):
     """Two of these in a frame are refused, and neither is done; the other axis is asked for nothing."""
     host = Host(dut, **parameters())

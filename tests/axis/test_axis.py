@@ -17,7 +17,7 @@ from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
 from oracles.axis import AxisTwin
 from stimuli import handle
 from stimuli.axes import busy, fastest, random_words
-from stimuli.lengths import REACHING, some_of
+from stimuli.lengths import REACHING, WHOLE, some_of
 from stimuli.places import place
 
 PINS, OUTPUTS = clocked.Pins._fields, clocked.Outputs._fields
@@ -135,7 +135,8 @@ async def host(bench: Bench, spec: AxisSpec, samples: int, random: np.random.Gen
 async def follows_model(dut):
     spec = make(**parameters()).spec
     # Every estimator has its own campaign; this one tests the wiring.
-    samples, random = max(SAMPLES, REACHING) // (5 if spec.estimator in ("levant", "fdm") else 20), rng()
+    samples = max(SAMPLES, REACHING) // (5 if spec.estimator in ("levant", "fdm") else 20) // (1 if WHOLE else 2)
+    random = rng()
     bench = Bench(dut, Axis(spec))
     await bench.reset()
     bench.drive(**dict.fromkeys(PINS, 0), commit=0)
@@ -177,7 +178,7 @@ async def every_output_is_the_twins_at_every_clock(dut):
     bench, twin, moves = Bench(dut, Axis(spec)), AxisTwin(Design(spec)), handle.edges(random, handle.Habits(index=0.1))
     await bench.reset()
     pins, words, left = dict.fromkeys(PINS, 0), random_words(spec.design, random), 0
-    for _ in range(300 * spec.clocks_per_sample):
+    for _ in range((300 if WHOLE else 100) * spec.clocks_per_sample):
         if left == 0:
             changed, left = next(moves)
             pins |= changed

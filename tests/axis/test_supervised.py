@@ -14,7 +14,7 @@ from hardwall.model.axis.supervisor import ALL, ARMED, CAUSES, DISARMED, TRIPPED
 from hardwall.testing import SAMPLES, SEED, Bench, Recorded, parameters, simulate
 from oracles.axis import AxisTwin
 from oracles.supervised import BITS, Follower
-from stimuli.lengths import REACHING, some_of
+from stimuli.lengths import REACHING, WHOLE, some_of
 from stimuli.specs import spec
 from stimuli.supervised_world import World
 
@@ -43,7 +43,7 @@ async def follows_models(dut):
     follower, axis = Follower(design), AxisTwin(design)
     states, compared, resets = set(), 0, 0
     shown = {"state": DISARMED, "latched": 0, "live": 0}
-    clocks = max(SAMPLES, REACHING)
+    clocks = max(SAMPLES, REACHING) // (1 if WHOLE else 2)
     for clock in range(clocks):
         given = world.act(shown["state"], shown["latched"], shown["live"])
         # First the counts of the causes fill; then the axis is reset in motion, again and again.

@@ -85,9 +85,8 @@ SIMULATING = {"amaranth", "dask", "distributed", "matplotlib", "pylibfst", "veri
 """What the extra `sim` installs and `host` does not; SciPy is imported by Numba where it is installed."""
 
 
-@pytest.mark.parametrize("name", OF_A_BOARD)
-def test_a_command_that_speaks_to_a_board_imports_nothing_of_the_simulation(name):
-    program = f"import sys, hardwall.cli.{name}; print(*sys.modules)"
+def test_commands_that_speak_to_a_board_import_nothing_of_the_simulation():
+    program = f"import sys, {', '.join(f'hardwall.cli.{name}' for name in OF_A_BOARD)}; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert [each for each in done.stdout.split() if f"{each}.".startswith("hardwall.sim.")] == []
 
@@ -98,7 +97,10 @@ def test_a_command_that_speaks_to_a_board_needs_the_extra_host_alone(name):
     done = without(SIMULATING, name, *port)
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith("hardwall: error: nowhere cannot be opened: there is none of that name")
-    bad = without(SIMULATING, name, *port, "--baud", "x")
+
+
+def test_an_option_is_refused_with_the_extra_host_alone():
+    bad = without(SIMULATING, "connect", "nowhere", "--baud", "x")
     assert (bad.returncode, bad.stderr.count("\n")) == (2, 1), bad.stderr
 
 

@@ -17,7 +17,7 @@ from hardwall.model.estimators.levant_adaptive import LOST, RAISED, START
 from hardwall.model.runtime.compiled import compiled
 from hardwall.testing import rng, simulate
 from hardwall.testing.estimators import model, reset_words
-from stimuli.lengths import some_of
+from stimuli.lengths import WHOLE, some_of
 from stimuli.papers_signal import BOUND, RATES, axis_at, swing
 from stimuli.seeded import seeded
 from stimuli.specs import spec
@@ -151,7 +151,7 @@ def test_model_is_the_exact_equation_rounded_as_documented(name):
         divisor = unit * 2 * scale * 2 ** ((level + RAISED) // 2)
         return near, min(levants.half_up(lam * twice_root * one * halves, divisor), beyond)
 
-    rows = levants.wrapped(d, stimulus(d, 10_000))
+    rows = levants.wrapped(d, stimulus(d, 10_000 if WHOLE else 4000))
     seen = model(d, rows, START)
     for k, (velocity, flags) in enumerate(levants.oracle_run(d, rows, step)):
         assert (velocity, flags) == (seen["velocity"][k], seen["saturated"][k]), f"sample {k}: {rows[k]}"

@@ -89,7 +89,7 @@ NO_STAMPS = [
     if not load("seed-2011", {"controller.estimator": name}).spec.design.estimator.uses_stamps()
 ]
 EVERY = [(*estimator, backend) for estimator in NO_STAMPS for backend in ("fixed", "float")]
-FEW = [("levant", "u1", "fixed"), ("levant", "u1", "float"), ("foaw", "best-fit", "fixed")]
+FEW = [("levant", "u1", "fixed"), ("levant", "u1", "float")]
 
 
 @pytest.mark.parametrize(("estimator", "output", "backend"), EVERY if LONG else FEW)

@@ -145,7 +145,7 @@ def test_what_is_covered_is_kept_and_failed_tests_are_run_again(monkeypatch, tmp
         yield from (counts and Counter(counts) for counts in given.pop(0))
 
     monkeypatch.setattr(cover, "_counted", counted)
-    block, findings = Block("link/part"), Findings(tmp_path / "coverage.json")
+    block, findings = Block("link/part"), Findings(tmp_path / "coverage")
     # A whole campaign that fails, after a short one that falls short, leaves nothing.
     assert [cover.measure(block, "a", findings) for _ in range(2)] == [None] * 2
     # A short one that is enough is all.

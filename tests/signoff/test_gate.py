@@ -135,7 +135,7 @@ def test_no_netlist_is_no_success(monkeypatch, capsys):
 
 
 def test_what_was_equal_is_kept_until_something_changes_that_it_came_from(monkeypatch, tmp_path):
-    findings, asked = Findings(tmp_path / "gate.json"), []
+    findings, asked = Findings(tmp_path / "gate"), []
 
     def compare(case, netlist, samples):
         asked.append(samples)
@@ -149,5 +149,5 @@ def test_what_was_equal_is_kept_until_something_changes_that_it_came_from(monkey
     # What differs is compared again.
     assert [run.run([CELLS], 11, lambda _: None, findings)[0].ok for _ in range(2)] == [False] * 2
     assert asked == [10, 11, 11]
-    digests = {run.origin_digest(case, 10) for case in (CELLS, SMALLEST, Case(FAMILIES["ice40"], TOPS[0]))}
+    digests = {run.origin_digest(case, 10) for case in (CELLS, SMALLEST, Case(FAMILIES["ice40"], CELLS.top))}
     assert len(digests) == 3

@@ -1,6 +1,5 @@
 """The mutants of a small component, and the means: `make mutate` draws mutants of every block."""
 
-import json
 import subprocess
 from dataclasses import replace
 from pathlib import Path
@@ -251,7 +250,7 @@ def test_tests_that_fail_without_a_mutant_say_nothing(monkeypatch):
 def test_what_came_of_a_block_is_kept_until_something_changes_that_it_came_from(monkeypatch, tmp_path):
     sizes, asked = [Size(HERE, Answer, {})], []
     came = [replace(fate, mutant=f": {fate.mutant}") for fate in (LEFT, EQUAL)]
-    block, findings = Block("part", tested_with="arithmetic/sqrt"), Findings(tmp_path / "mutate.json")
+    block, findings = Block("part", tested_with="arithmetic/sqrt"), Findings(tmp_path / "mutate")
 
     def fates(size, modules, count, before):
         asked.append((count, *before))
@@ -270,7 +269,7 @@ def test_what_came_of_a_block_is_kept_until_something_changes_that_it_came_from(
     # With other proofs, what had survived is asked about again.
     monkeypatch.setattr(run, "PROVING", run.PROVING[:1])
     monkeypatch.setattr(run, "_digest", lambda block, sizes, count: kept["part"]["digest"])
-    kept = json.loads((tmp_path / "mutate.json").read_text(encoding="utf-8"))
+    kept = findings.every()
     run.run([block], 2, True, lambda result: None, findings)
     assert asked[5:] == [(2, *came)]
 

@@ -60,7 +60,7 @@ def test_is_proven_and_a_bug_is_found(known):
     assert [verdict.refuted for verdict in outcome.bugs] == [True]
 
 
-@pytest.mark.parametrize("known", QUICK, ids=[known.name for known in QUICK])
+@pytest.mark.parametrize("known", PROVEN, ids=[known.name for known in PROVEN])
 def test_every_bug_changes_the_hardware(known):
     right = known.rtlil()
     assert [bug for bug in known.bugs if known.rtlil(bug) == right] == []
@@ -102,7 +102,7 @@ def test_the_range_of_a_product_is_that_of_all_products(signs):
 
 
 def test_what_is_proven_is_kept_until_it_changes(monkeypatch, tmp_path):
-    findings = Findings(tmp_path / "prove.json")
+    findings = Findings(tmp_path / "prove")
     known, asked = sums("difference"), []
 
     def solve(name, text, depth, bounded):

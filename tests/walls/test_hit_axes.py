@@ -13,7 +13,7 @@ from hardwall.sim.scene.schema import Scene
 from hardwall.sim.scene.several import AxesScene
 from hardwall.sim.scene.tables import load_any, parse_axes, read
 from hardwall.sim.walls import hit, hit_axes
-from stimuli.lengths import LONG
+from stimuli.lengths import LONG, some_of
 from stimuli.scenes import AMPLIFIER, CABLE, HAND, SHORT_OF_AXES
 
 FDM = {"controller.estimator": "fdm", "controller.output": None, "controller.gains": None}
@@ -41,7 +41,7 @@ def kept(result: hit.Hit) -> dict:
     return {key: value for key, value in result.report().items() if key not in ("seconds", "samples_per_s")}
 
 
-@pytest.mark.parametrize("backend", ["fixed", "float"])
+@pytest.mark.parametrize("backend", some_of(["fixed", "float"], 0))
 def test_an_axis_is_a_single_one_that_samples_in_its_turn(backend):
     """The loop of one axis and the axis of `AxisSpec` give all its force words; but for gains of its own, of which the
     formats of a single axis follow."""

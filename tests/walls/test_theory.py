@@ -58,7 +58,7 @@ CASES = {
 }
 
 
-QUICK = "fdm, soft", "samples overlap", "cable, encoder at the motor", "all of them and a damping circuit"
+QUICK = "fdm, soft", "samples overlap", "all of them and a damping circuit"
 """Every part is in one of these, the filter and the overlap, too; `make soak` has each alone."""
 
 

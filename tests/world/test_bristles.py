@@ -12,6 +12,7 @@ from hardwall.sim.world.presliding import bristled
 from hardwall.sim.world.rigid import Coulomb, Handle, Motion, Rigid, span
 from stimuli.bristles import COULOMB_N, DAHL, HANDLE, LUGRE, STATIC_N, STRIBECK
 from stimuli.device_motion import after
+from stimuli.lengths import some_of
 
 PLANTS = {"dahl": DAHL, "lugre": LUGRE}
 FREE = Handle(0.35, 0.0)
@@ -73,7 +74,7 @@ def cases(plant, number):
 
 
 @pytest.mark.parametrize("name", PLANTS)
-@pytest.mark.parametrize("number", range(2))
+@pytest.mark.parametrize("number", some_of(range(2), 1))
 def test_motion_agrees_with_radau_within_what_radau_may_be_off(name, number):
     plant = PLANTS[name]
     for start, force, seconds in cases(plant, number):

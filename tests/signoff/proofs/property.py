@@ -39,9 +39,14 @@ class Property:
         return f"{'bounded' if self.bounded else 'induction'}, {self.depth}"
 
     @property
+    def title(self) -> str:
+        """The block and the promise, in a line."""
+        return f"{self.block}: {self.promise}"
+
+    @property
     def name(self) -> str:
         """A name for files and tests."""
-        return "-".join(re.findall(r"\w+", f"{self.block} {self.promise}"))
+        return "-".join(re.findall(r"\w+", self.title))
 
     def rtlil(self, bug: Bug | None = None) -> str:
         """Return the top of the proof for Yosys, with a bug in the hardware or without."""

@@ -47,7 +47,7 @@ class Outcome:
     def line(self) -> str:
         """One line for the progress."""
         seconds = self.verdict.seconds + sum(verdict.seconds for verdict in self.bugs)
-        return f"{self.property.block}: {self.property.promise}: {self.result} ({seconds:.0f} s)"
+        return f"{self.property.title}: {self.result} ({seconds:.0f} s)"
 
     @property
     def explanation(self) -> str:
@@ -61,7 +61,7 @@ class Outcome:
             else "in a step of the induction, perhaps from a state that no reset leads to"
         )
         lines = "".join(f"  {line}\n" for line in verdict.failed)
-        head = f"{self.property.block}: {self.property.promise}: fails {where}; the waveform is {verdict.trace}\n"
+        head = f"{self.property.title}: fails {where}; the waveform is {verdict.trace}\n"
         return f"\n{head}{lines}{table(verdict.trace, self.text)}\n"
 
 
@@ -86,7 +86,7 @@ def run(properties: Sequence[Property], done: Callable[[Outcome], None], finding
         digest = digest_of(
             proven_by, _unplaced(text), [*map(_unplaced, wrong)], known.depth, known.bounded, known.within
         )
-        kept = findings.of(known.name, digest)
+        kept = findings.of(known.title, digest)
         if kept is not None:
             verdict, *bugs = (Verdict.of(each) for each in kept)
             return Outcome(known, verdict, tuple(bugs), text)
@@ -95,7 +95,7 @@ def run(properties: Sequence[Property], done: Callable[[Outcome], None], finding
         came = Outcome(known, verdict, tuple(bugs), text)
         # What fell short is tried again, for the solver may have had too little time.
         if came.ok:
-            findings.keep(known.name, digest, [each.as_json for each in (verdict, *bugs)])
+            findings.keep(known.title, digest, [each.as_json for each in (verdict, *bugs)])
         return came
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
