@@ -32,6 +32,9 @@ SCENE := seed-2011
 ESTIMATORS := levant fdm
 REPORTS := $(ESTIMATORS:%=build/hit-%.json) $(ESTIMATORS:%=build/mhz-%.json)
 PICTURES := $(REPORTS:%.json=%.png)
+# One more wall, at two rates, in one picture.
+TWO_RATES := build/hit-two-rates.png
+BESIDE = $(HARDWALL) hit seed-2011 --beside mhz --stiffness 50e3 --damping 20 --plot
 
 # What `make synth` compares, one part of each kind, and the boards that `make boards` builds for.
 DEVICES := ecp5-25k ice40-up5k gw1nr-9
@@ -45,6 +48,9 @@ MAPPED := seed-2011 fit-2011 drive-2011
 STUDIES := cutoff gains drop trade
 # Above them a hit takes long: the whole study takes hours.
 RATES := 1e3,2.5e3,1e4,2.5e4,1e5
+# What the README shows of them, and of the walls.
+SEEN := fdm,butterworth,kalman,levant:u1
+COARSE := $(addprefix --set zwidth., stiffness_step_n_per_m=20e3 damping_from_n_s_per_m=30 damping_step_n_s_per_m=60)
 
 SEEDS ?= $(shell shuf -i 1-999999999 -n 3)
 SAMPLES ?= 1000000
@@ -57,11 +63,14 @@ PYTEST = $(RUN) pytest -n $(if $(filter 1 2 3 4 5 6 7,$(CORES)),$$(($(CORES) + 1
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures panel browser screenshots verilog docs digests soak fuzz clean distclean help tools FORCE
+.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures panel browser screenshots verilog docs diagrams results sight digests soak fuzz clean distclean help tools FORCE
 
-all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
+all: $(REPORTS) $(PICTURES) $(TWO_RATES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
-	@printf '%s\n' $(PICTURES)
+	@printf '%s\n' $(PICTURES) $(TWO_RATES)
+	@printf '%s\n' '' 'Next:  source .venv/bin/activate' \
+	  '       make panel                        push a handle into the wall, in the browser' \
+	  '       hardwall hit mhz --plot hit.png   your own hits; docs/guide/start.md goes on from here'
 
 # The longer campaigns, of a pytest of one's own and of what draws mutants or counts coverage, are its default.
 test: export HARDWALL_SAMPLES ?= 12500
@@ -131,6 +140,20 @@ docs: $(VENV)/.docs | tools ## the pages as a site in build/docs, every link ins
 	@$(RUN) sphinx --quiet --fail-on-warning --keep-going --doctree-dir build/doctrees docs build/docs
 	@echo build/docs/index.html
 
+diagrams: $(VENV)/.docs | tools ## draw the diagrams of the pages anew, from the code that they show
+	@$(RUN) docs.diagrams.draw
+
+results: $(VENV)/.docs | tools ## the reports of the pages of results: those whose sources have changed, or ONLY="NAMES" (an hour and more)
+	@$(VENV)/bin/python docs/reports.py $(ONLY)
+	@$(VENV)/bin/python docs/in_readme.py
+
+sight: $(VENV)/.test | tools ## the pictures of the README anew: two hits side by side, and what rate buys (half an hour)
+	@$(BESIDE) docs/pictures/hit.gif >/dev/null
+	@$(BESIDE) docs/pictures/hit-two-rates.png >/dev/null
+	@$(HARDWALL) accuracy --estimators $(SEEN),edge-kalman --rates 1e3,2.5e3,1e4,2.5e4,1e5,2.5e5,1e6 --json >build/accuracy.json
+	@$(HARDWALL) rates --estimators $(SEEN) --rates 1e3,1e4,1e5,1e6 --starts 1 --resume $(COARSE) --json >build/rates.json
+	@$(IN_TESTS) support.rate_buys build/accuracy.json build/rates.json docs/pictures/rate-buys.png
+
 digests: $(VENV)/.test | tools ## record anew what the program computes, and show what changed (after a change on purpose)
 	@$(IN_TESTS) support.digests $(ONLY)
 
@@ -169,6 +192,11 @@ define hit
 @$(HARDWALL) hit $(1) --estimator $* --backend $(2) --plot $(basename $@).png --json >$(basename $@).partial
 @mv $(basename $@).partial $(basename $@).json
 endef
+
+$(TWO_RATES): $(SOURCES) $(VENV)/.sim | tools
+	@mkdir -p build
+	@echo "Hitting another wall at two rates, side by side ..."
+	@$(BESIDE) $@ >/dev/null
 
 build/hit-%.json build/hit-%.png: $(SOURCES) $(VENV)/.sim | tools
 	$(call hit,$(SCENE),rtl,the generated hardware)

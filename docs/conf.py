@@ -21,13 +21,20 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
+    "sphinx_reredirects",
     "from_the_program",
     "from_the_findings",
+    "from_the_reports",
     "from_docstrings",
 ]
 exclude_patterns = ["examples"]
 root_doc = "index"
 default_role = "code"
+
+# ---- old addresses ---------------------------------------------------------------------------------------------------
+
+with (ROOT / "docs/moved.toml").open("rb") as file:
+    redirects = {old: f"{new}.html" for old, new in tomllib.load(file).items()}
 
 # ---- pages in Markdown ----------------------------------------------------------------------------------------------
 

@@ -24,7 +24,8 @@ from support.pages import PAGES, ROOT, blocks, command_line, commands, text_of
 
 TOOLS = {"cd", "cp", "dask", "git", "pip", "pytest", "python", "source"}
 """First words of commands that are not run, besides `hardwall` and `make`."""
-PARSED = () if LONG else tuple(f"docs/{name}.md" for name in ("axes", "board", "scenes", "virtual", "walls"))
+MANY_COMMANDS = "guide/axes", "reference/hardware", "reference/scenes", "reference/virtual", "results/walls"
+PARSED = () if LONG else tuple(f"docs/{name}.md" for name in MANY_COMMANDS)
 """The pages with the longest commands, of which the short form parses all: other tests have shorter calls of them."""
 UNRUN = [
     (name, " ".join(words), words)
@@ -99,7 +100,9 @@ def test_a_command_that_is_not_run_is_accepted(words):
 
 
 def test_the_api_has_every_module_of_the_model():
-    shown = {name for page in ("docs/api.md", "docs/api-estimators.md") for name in _modules_on(page)}
+    shown = {
+        name for page in ("docs/reference/api.md", "docs/reference/api-estimators.md") for name in _modules_on(page)
+    }
     paths = [path.relative_to(ROOT).with_suffix("") for path in (ROOT / "model").rglob("*.py")]
     # What is in runtime/ is no model; what a block of one's own needs of it is shown.
     modules = {".".join(("hardwall", *path.parts)) for path in paths if path.stem != "__init__"}
@@ -112,10 +115,14 @@ PICTURES = sorted((ROOT / "docs/pictures").iterdir())
 
 @pytest.mark.parametrize("path", PICTURES, ids=[path.name for path in PICTURES])
 def test_every_picture_is_as_wide_as_a_page_and_on_a_page(path):
-    """A picture of another width was drawn before the style that all pictures share."""
-    head = path.read_bytes()[:24]
-    assert head[:8] == b"\x89PNG\r\n\x1a\n"
-    assert int.from_bytes(head[16:20], "big") == round(PAGE_IN * DPI)
+    """A picture of another width was drawn before the style that all pictures share; one that moves may be narrower."""
+    head, width = path.read_bytes()[:24], round(PAGE_IN * DPI)
+    if path.suffix == ".gif":
+        assert head[:6] == b"GIF89a"
+        assert 0 < int.from_bytes(head[6:8], "little") <= width
+    else:
+        assert head[:8] == b"\x89PNG\r\n\x1a\n"
+        assert int.from_bytes(head[16:20], "big") == width
     assert [name for name in PAGES if f"pictures/{path.name})" in text_of(name)]
 
 
@@ -125,9 +132,9 @@ def _modules_on(page: str) -> list[str]:
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_every_estimator_is_described_measured_and_sourced(estimator):
-    text = text_of("docs/estimators.md")
+    text = text_of("docs/results/estimators.md")
     assert len(re.findall(rf"^\|[^|]*`{estimator}`", text, re.MULTILINE)) >= 3, "what it is, a measurement, its costs"
-    assert f"`{estimator}`" in text_of("docs/sources.md")
+    assert f"`{estimator}`" in text_of("docs/reference/sources.md")
 
 
 @pytest.mark.parametrize("example", EXAMPLES)
@@ -155,9 +162,17 @@ def test_an_example_works_in_a_copy_of_the_project(example, tmp_path):
     _run([sys.executable, "-m", "pytest", *quick, *own, *GATES[example]], tmp_path, environ)
 
 
+@pytest.mark.parametrize("example", GATES)
+def test_the_wiring_of_an_example_fits_this_tree(example):
+    if _is_wired(example):
+        pytest.skip("this is the tree of a reader, who has wired it")
+    patch = ROOT / "docs/examples" / example / "wiring.patch"
+    _run(["git", "apply", "--check", str(patch)], ROOT, dict(os.environ))
+
+
 def test_every_gate_of_an_example_is_on_its_page():
     assert {path.parent.name for path in (ROOT / "docs/examples").glob("*/wiring.patch")} == set(GATES)
-    for example, page in (("two_step", "docs/own-estimator.md"), ("layered", "docs/own-law.md")):
+    for example, page in (("two_step", "docs/guide/add-an-estimator.md"), ("layered", "docs/guide/add-a-force-law.md")):
         assert [gate for gate in GATES[example] if f"`{gate}`" not in text_of(page)] == []
 
 

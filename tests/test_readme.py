@@ -1,23 +1,35 @@
 """The README stays short, as that of the tests; both and every page name only what exists."""
 
 import re
+import tomllib
 
 import pytest
 
 from support.pages import PAGES, ROOT, command_line, slugs, text_of
 
-README_LINES = 150
+README_LINES, README_WORDS = 120, 900
 # NAME and PATH in a page stand for names that the reader fills in.
 PLACEHOLDER = re.compile(r"NAME|PATH|CHOICE")
 
 
 def test_the_readme_is_one_screen_and_a_bit():
     assert len(text_of("README.md").splitlines()) <= README_LINES
+    assert len(text_of("README.md").split()) <= README_WORDS
 
 
-def test_the_readme_leads_to_every_page():
-    pages = {name for name in PAGES if name.startswith("docs/")} - {"docs/index.md"}
-    assert pages - set(re.findall(r"\]\((docs/[\w-]+\.md)\)", text_of("README.md"))) == set()
+def test_the_readme_leads_to_every_guide_and_the_first_page_to_every_page():
+    guides = {name for name in PAGES if name.startswith("docs/guide/")}
+    assert guides - set(re.findall(r"\]\((docs/[\w/-]+\.md)\)", text_of("README.md"))) == set()
+    pages = {name.removeprefix("docs/").removesuffix(".md") for name in PAGES if name.startswith("docs/")} - {"index"}
+    listed = re.findall(r"^((?:guide|results|reference)/[\w-]+)$", text_of("docs/index.md"), re.MULTILINE)
+    assert sorted(listed) == sorted(pages)
+
+
+def test_old_addresses_lead_to_pages():
+    moved = tomllib.loads(text_of("docs/moved.toml"))
+    assert len(moved) > 20
+    assert {f"docs/{new}.md" for new in moved.values()} - {*PAGES} == set()
+    assert {f"docs/{old}.md" for old in moved} & {*PAGES} == set()
 
 
 def test_the_tests_say_in_one_screen_where_what_is():

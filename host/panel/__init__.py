@@ -1,1 +1,1 @@
-"""A page in a browser that shows a board, and sets and arms it; see `docs/panel.md`."""
+"""A page in a browser that shows a board, and sets and arms it; see `docs/guide/feel.md`."""

@@ -1,8 +1,8 @@
 """The PLLs of the parts: which clocks they make from a board's oscillator, and the Verilog that makes one.
 
 A clock is made exactly or not at all: every gain of an axis has its frequency in it. The ranges are those of the
-vendors' data sheets, which `docs/boards.md` cites; of several ways to make a clock, the one is taken whose phase
-detector is the fastest, and then the one whose oscillator (VCO) is nearest to the middle of its range.
+vendors' data sheets, which `docs/reference/boards.md` cites. Of several ways to make a clock, the one is taken whose
+phase detector is the fastest, and then the one whose oscillator (VCO) is nearest to the middle of its range.
 """
 
 from abc import ABC, abstractmethod

@@ -52,7 +52,7 @@ def _page(board: Description, shown: str, signals: str, drives: str) -> str:
 # Wiring of `{board.name}`: {board.title}
 
 Generated from the description of the board. **It was not tried on real hardware**: before anything is connected, hold
-it against the board's own papers, and follow the checklist of the page *Boards*.
+it against the board's own papers, and follow the checklist of the page *Connect a motor safely*.
 
 {shown}
 

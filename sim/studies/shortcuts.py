@@ -52,8 +52,10 @@ LACKED = {
     },
     "with hysteresis and jitter": {"encoder.hysteresis_counts": 0.2, "encoder.jitter_s": 50e-9},
 }
-"""Parts that a device or a controller has and a scene may lack, with figures of `docs/scenes.md` where a data sheet or
-a paper has them, each where the scene says none."""
+"""Parts that a device or a controller has and a scene may lack, each where the scene says none.
+
+Their figures are those of `docs/reference/scenes.md` where a data sheet or a paper has them.
+"""
 SLOWER = 2, 5
 """The factors by which the sample rate is lower."""
 CLOCK = 4

@@ -12,7 +12,7 @@ from hardwall.cli.group import app
 
 ROOT = Path(__file__).absolute().parents[2]
 PAGES = sorted(
-    ["README.md", "CONTRIBUTING.md", *(str(path.relative_to(ROOT)) for path in (ROOT / "docs").glob("*.md"))]
+    ["README.md", "CONTRIBUTING.md", *(str(path.relative_to(ROOT)) for path in (ROOT / "docs").rglob("*.md"))]
 )
 
 

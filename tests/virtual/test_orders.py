@@ -54,7 +54,7 @@ def test_the_hand_the_motor_and_the_line(told):
 
 
 def test_the_page_has_every_order():
-    rows = re.findall(r"^\| (`.*?) \|", text_of("docs/virtual.md"), re.MULTILINE)
+    rows = re.findall(r"^\| (`.*?) \|", text_of("docs/reference/virtual.md"), re.MULTILINE)
     assert {words.split()[0] for row in rows for words in re.findall("`(.*?)`", row)} == set(ORDERS)
 
 

@@ -12,7 +12,7 @@ from hardwall.sim.walls.starts import start
 from stimuli.lengths import long_form
 
 STARTS = 40
-PAGE = Path(__file__).parents[2] / "docs/walls.md"
+PAGE = Path(__file__).parents[2] / "docs/results/walls.md"
 ROW = re.compile(r"^\| (\d+) kN/m, (\d+) N s/m \| (\d+) \| (\d+) \| (\d+) \| (\d+) \|$", re.MULTILINE)
 TABLE = [tuple(map(int, row)) for row in ROW.findall(PAGE.read_text(encoding="utf-8"))]
 """K (kN/m), B (N s/m), and the stable hits as built, with a finer velocity, with a finer root, and in float64."""

@@ -1,13 +1,15 @@
 """Velocity as the mean of the last two differences of counts: a worked example of an estimator.
 
-    v = (f_k - f_{k-2}) / 2                  counts a sample
+    v = (d_k + d_{k-1}) / 2                  counts a sample
+    d_k = f_k - f_{k-1}                      modulo the count's width
 
 Formats, derived. The velocity has one fraction bit, so that half a count a sample is exact: nothing is rounded. Its
 range is twice the axis's largest speed, like the range of the finite difference.
 
-Ends. The difference is taken modulo the count's width, so the count may wrap. A step, or a speed, of more than twice
-the largest speed saturates, with the flag `velocity_saturated`. The first sample, and every sample with `restart`,
-reads 0, and the sample after it has only one difference, which counts half. Standstill reads 0.
+Ends. Every difference is taken modulo the count's width, so the count may wrap; their sum has a bit more, so that no
+speed reads as a smaller one. A step, or a speed, of more than twice the largest speed saturates, with the flag
+`velocity_saturated`. The first sample, and every sample with `restart`, reads 0, and the sample after it has only one
+difference, which counts half. Standstill reads 0.
 
 Source: elementary.
 """
@@ -45,11 +47,11 @@ class FloatParams(NamedTuple):
 
 
 class State(NamedTuple):
-    """Whether a sample was taken, and the last two counts."""
+    """Whether a sample was taken, the last count, and the last difference."""
 
     running: int
     last: int
-    before: int
+    moved: int
 
 
 START = State(0, 0, 0)
@@ -64,7 +66,8 @@ class Design(EstimatorDesign):
 
     def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
-        self.velocity = SQ(1 + max(1, bits_for(2 * axis.speed_max_counts_per_sample)), axis.shrunk(1))
+        # The word is the sum of two differences: `hardwall bits` can drop none of its bits.
+        self.velocity = SQ(1 + max(1, bits_for(2 * axis.speed_max_counts_per_sample)), 1 + axis.shrunk(0))
 
     def params(self, words: Mapping[str, int]) -> Params:
         return Params(self.count_width, self.velocity.max)
@@ -78,16 +81,17 @@ class Design(EstimatorDesign):
 
 @compiled
 def _take(width, state, count, restart):
-    """Return the change over two samples, and the state after this one."""
+    """Return the sum of the last two differences, and the state after this sample."""
     if restart or not state.running:
-        return 0, State(1, count, count)
-    return wrap(count - state.before, width), State(1, count, state.last)
+        return 0, State(1, count, 0)
+    moved = wrap(count - state.last, width)
+    return moved + state.moved, State(1, count, moved)
 
 
 @estimate.register(Params)
 @compiled
 def step(params, state, seen, restart):
-    # The velocity has one fraction bit, so its word is the change over two samples.
+    # The velocity has one fraction bit, so its word is the sum of two differences.
     change, state = _take(params.count_width, state, seen.count, restart)
     velocity = saturate(change, -params.velocity_max - 1, params.velocity_max)
     return state, velocity, int(velocity != change)

@@ -37,13 +37,14 @@ def test_rtl(name):
     simulate(__file__, make, name=name)
 
 
-def test_model_is_the_wrapped_change_over_two_samples():
+def test_model_is_the_sum_of_two_wrapped_differences():
     width, top = design("paper").count_width, design("paper").velocity.max
     counts = rng().integers(-(1 << (width - 1)), 1 << (width - 1), 10_000).tolist()
     seen = model(design("paper"), [(count, 0) for count in counts], START)["velocity"]
-    changes = [0] + [now - before for before, now in zip([counts[0], *counts], counts[1:], strict=False)]
-    wrapped = [(change + (1 << (width - 1))) % (1 << width) - (1 << (width - 1)) for change in changes]
-    assert seen.tolist() == [min(max(change, -top - 1), top) for change in wrapped]
+    half = 1 << (width - 1)
+    moved = (np.diff(counts) + half) % (2 * half) - half
+    sums = [0, *(moved + np.append(0, moved[:-1])).tolist()]
+    assert seen.tolist() == [min(max(each, -top - 1), top) for each in sums]
 
 
 def test_wrong_design_is_refused():

@@ -1,0 +1,89 @@
+"""Which estimator to choose: questions, and where each answer leads."""
+
+from hardwall.model.estimators.registry import ESTIMATORS
+
+from .sheet import BLUE, GREEN, GREY, Box, Place, Sheet, bold, small
+
+QUESTIONS = {
+    "axes": (Box(20, 20, 272, 46), "several axes in one pipeline?", ""),
+    "stamps": (Box(20, 98, 272, 46), "can the clock stamp edges?", ""),
+    "bursts": (Box(20, 176, 272, 46), "edges in bursts?", ""),
+    "cells": (Box(20, 258, 272, 54), "logic cells left?", "edges are stamped"),
+    "places": (Box(140, 378, 200, 56), "edges in their places?", ""),
+    "counts": (Box(372, 258, 308, 54), "logic cells left?", "from counts alone"),
+    "bound": (Box(500, 378, 180, 56), "acceleration", "bound known?"),
+}
+LEAVES = {
+    "axes": (Box(430, 14, 250, 58), "levant", "output u1", ""),
+    "mt": (Box(20, 378, 100, 56), "mt", "few cells", ""),
+    "places": (Box(20, 492, 152, 78), "levant-edge", "best at an impact", ""),
+    "edges": (Box(188, 492, 152, 78), "edge-kalman", "tolerates", "misplaced edges"),
+    "fewest": (Box(372, 378, 92, 56), "window", "fewest cells", ""),
+    "counts": (Box(372, 492, 150, 78), "kalman", "most accurate", "from counts"),
+    "bound": (Box(536, 492, 144, 78), "levant-adaptive", "gains follow", "the signal"),
+}
+"""Where the questions and the estimators are, and their words."""
+BUS = 332
+"""Where what leads to the counts alone comes down."""
+
+
+def draw() -> str:
+    """Return the diagram."""
+    sheet = Sheet(592)
+    for at, question, note in QUESTIONS.values():
+        second = () if not note else (note,) if at is QUESTIONS["bound"][0] else (small(note),)
+        sheet.box(at, question, *second, tone=GREY)
+    for at, name, *notes in LEAVES.values():
+        if name not in ESTIMATORS:
+            raise ValueError(f"a leaf must be one of {', '.join(ESTIMATORS)}, not {name!r}")
+        sheet.box(at, bold(name), *(small(note) for note in notes if note), tone=GREEN)
+    _upper(sheet)
+    _left(sheet)
+    _right(sheet)
+    return sheet.svg()
+
+
+def _answer(sheet: Sheet, said: str, at: Place, *way: Place, align: str = "left") -> None:
+    """Draw an arrow, and beside it the answer that takes it."""
+    sheet.wire(*way)
+    sheet.text(at, small(said, BLUE.edge), align=align)
+
+
+def _upper(sheet: Sheet) -> None:
+    """Draw the answers to the questions that come first."""
+    axes, stamps, bursts, cells, counts = (
+        QUESTIONS[name][0] for name in ("axes", "stamps", "bursts", "cells", "counts")
+    )
+    _answer(sheet, "yes", (axes.right + 8, axes.y - 11), axes.east, LEAVES["axes"][0].west)
+    for said, above, below in (("no", axes, stamps), ("yes", stamps, bursts), ("no", bursts, cells)):
+        _answer(sheet, said, (above.x + 8, above.bottom + 14), above.south, below.north)
+    _answer(sheet, "fewer", (cells.right + 8, cells.y + 13), cells.east, counts.west)
+    for said, box in (("no", stamps), ("yes", bursts)):
+        sheet.wire(box.east, (BUS, box.y), (BUS, cells.y), heads="-")
+        sheet.text((box.right + 8, box.y - 11), small(said, BLUE.edge), align="left")
+    sheet.dot((BUS, cells.y), 3.5)
+    sheet.dot((BUS, bursts.y), 3.5)
+
+
+def _left(sheet: Sheet) -> None:
+    """Draw the answers where edges are stamped."""
+    cells, places = QUESTIONS["cells"][0], QUESTIONS["places"][0]
+    _down(sheet, "for mt only", 70, cells, LEAVES["mt"][0])
+    _down(sheet, "for edge-kalman", 190, cells, places)
+    _down(sheet, "yes", 158, places, LEAVES["places"][0])
+    _down(sheet, "no", 264, places, LEAVES["edges"][0])
+
+
+def _right(sheet: Sheet) -> None:
+    """Draw the answers where there are only counts."""
+    counts, bound = QUESTIONS["counts"][0], QUESTIONS["bound"][0]
+    _down(sheet, "fewer", 400, counts, LEAVES["fewest"][0])
+    _down(sheet, "kalman only", 479, counts, LEAVES["counts"][0])
+    _down(sheet, "levant-adaptive", 569, counts, bound)
+    _down(sheet, "yes", 511, bound, LEAVES["counts"][0])
+    _down(sheet, "no", 608, bound, LEAVES["bound"][0])
+
+
+def _down(sheet: Sheet, said: str, x: float, above: Box, below: Box) -> None:
+    """Draw an arrow straight down, with its answer on the right."""
+    _answer(sheet, said, (x + 7, above.bottom + 24), (x, above.bottom), (x, below.top))

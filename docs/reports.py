@@ -1,0 +1,197 @@
+"""The reports that pages of results are made of: which command makes each, and whether its sources have changed since.
+
+`docs/results/reports.toml` names them. `python docs/reports.py` runs the commands whose report is stale, or of those
+named; `--list` only says which are, and how long each took. A report is kept as `docs/results/reports/NAME.json`, with
+its command, the version, the date and the machine. Its origin is a digest of the code of every module that the command
+imports, but for those that only show or keep what was computed; comments and docstrings are no part of it.
+"""
+
+import argparse
+import ast
+import datetime
+import functools
+import hashlib
+import json
+import os
+import platform
+import shlex
+import subprocess
+import sys
+import time
+import tomllib
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from hardwall.model.runtime.provenance import imported
+
+DOCS = Path(__file__).absolute().parent
+TREE = DOCS.parent
+LIST, KEPT, PICTURES = DOCS / "results/reports.toml", DOCS / "results/reports", DOCS / "pictures"
+SHOWING = "cli", "model/runtime", "sim/jobs", "sim/pictures"
+"""Rooms that change no number."""
+HARDWARE = "hdl", "sim/boards", "sim/rtl"
+"""Rooms that matter to what runs the RTL, or counts its cells."""
+OF_HARDWARE = "bench", "board", "choose", "costs", "synth"
+"""Commands that do."""
+VERSION = tomllib.loads((TREE / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A report that pages want.
+
+    Attributes:
+        name: its name.
+        command: the words of its command behind `hardwall`.
+        picture: the file in `docs/pictures/` that the command draws; empty for none.
+    """
+
+    name: str
+    command: str
+    picture: str = ""
+
+    @property
+    def words(self) -> list[str]:
+        """The words of the command that makes the report."""
+        drawn = ["--plot", str(PICTURES / self.picture)] if self.picture else []
+        return [*shlex.split(self.command), "--json", *drawn]
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A report that was made.
+
+    Attributes:
+        command: the command, as a reader types it.
+        version: the version of the project.
+        date: when it was made, as in ISO 8601.
+        machine: the processor and the number of its cores.
+        origin: the digest of the code that it comes from.
+        seconds: how long it took.
+        report: what the command said.
+    """
+
+    command: str
+    version: str
+    date: str
+    machine: str
+    origin: str
+    seconds: float
+    report: dict[str, Any]
+
+
+def wanted() -> dict[str, Wanted]:
+    """Return the reports that pages want, by name."""
+    listed = tomllib.loads(LIST.read_text(encoding="utf-8"))
+    return {name: Wanted(name, **each) for name, each in listed.items()}
+
+
+def kept(name: str) -> Kept | None:
+    """Return a report as it was made last; None if it never was."""
+    file = KEPT / f"{name}.json"
+    return Kept(**json.loads(file.read_text(encoding="utf-8"))) if file.exists() else None
+
+
+def is_stale(report: Wanted) -> bool:
+    """Return whether a report was never made, or by another command, or from other code."""
+    found = kept(report.name)
+    return found is None or (found.command, found.origin) != (f"hardwall {report.command}", origin(report.command))
+
+
+@functools.cache
+def _code_of(file: Path) -> str:
+    """Return a source without its comments and docstrings."""
+    tree = ast.parse(file.read_bytes())
+    for node in ast.walk(tree):
+        documented = isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
+        if documented and ast.get_docstring(node, clean=False) is not None:
+            node.body = node.body[1:] or [ast.Pass()]
+    return ast.unparse(tree)
+
+
+def _files(name: str) -> Iterator[Path]:
+    """Yield the file of a module of the project."""
+    inside = TREE.joinpath(*name.split(".")[1:])
+    if name.startswith("hardwall."):
+        yield from (file for file in (inside.with_suffix(".py"), inside / "__init__.py") if file.is_file())
+
+
+def sources_of(command: str) -> list[Path]:
+    """Return the sources that the numbers of a command come from: what it imports, directly or not."""
+    words = shlex.split(command)
+    hardware = words[0] in OF_HARDWARE or "rtl" in words
+    others = (*SHOWING, *(() if hardware else HARDWARE))
+    waiting, seen = [TREE / "cli" / f"{words[0]}.py"], set[Path]()
+    while waiting:
+        file = waiting.pop()
+        if file not in seen:
+            seen.add(file)
+            package = ".".join(["hardwall", *file.relative_to(TREE).parent.parts])
+            waiting += (found for name in imported(file.read_bytes(), package) for found in _files(name))
+    return sorted(file for file in seen if not any(file.is_relative_to(TREE / room) for room in others))
+
+
+@functools.cache
+def origin(command: str) -> str:
+    """Return a digest of the code that the report of a command comes from, and of the scenes of the project."""
+    digest = hashlib.sha256()
+    for file in sources_of(command):
+        digest.update(f"{file.relative_to(TREE)}\0{_code_of(file)}\0".encode())
+    for scene in sorted((TREE / "sim/scene/builtin").glob("*.toml")):
+        digest.update(scene.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def machine() -> str:
+    """Return what a report's times depend on."""
+    return f"{os.cpu_count()} cores, {platform.machine()}, Python {platform.python_version()}"
+
+
+def make(report: Wanted) -> Kept:
+    """Run the command of a report, and keep what it says.
+
+    Raises:
+        subprocess.CalledProcessError: if the command fails.
+    """
+    began = time.monotonic()
+    program = [sys.executable, "-c", "from hardwall.cli.app import main; main()"]
+    done = subprocess.run([*program, *report.words], cwd=TREE, stdout=subprocess.PIPE, text=True, check=True)
+    made = Kept(
+        command=f"hardwall {report.command}",
+        version=VERSION,
+        date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
+        machine=machine(),
+        origin=origin(report.command),
+        seconds=round(time.monotonic() - began, 1),
+        report=json.loads(done.stdout),
+    )
+    KEPT.mkdir(exist_ok=True)
+    unfinished = KEPT / f"{report.name}.new"
+    unfinished.write_text(json.dumps(asdict(made), indent=1) + "\n", encoding="utf-8")
+    unfinished.replace(KEPT / f"{report.name}.json")
+    return made
+
+
+def main() -> None:
+    """Make the stale reports, or those named."""
+    parser = argparse.ArgumentParser(description="Make the reports that pages of results are made of.")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="reports to make; none for all that are stale")
+    parser.add_argument("--list", action="store_true", help="say what is stale, and run nothing")
+    options = parser.parse_args()
+    known = wanted()
+    if unknown := [name for name in options.names if name not in known]:
+        parser.error(f"NAME must be one of {', '.join(known)}, not {unknown[0]}")
+    chosen = [known[name] for name in options.names] or [report for report in known.values() if is_stale(report)]
+    for report in chosen:
+        before = kept(report.name)
+        took = f"took {before.seconds:.0f} s" if before else "never made"
+        print(f"{report.name}: hardwall {report.command} ({took})", flush=True)
+        if not options.list:
+            print(f"{report.name}: {make(report).seconds:.0f} s", flush=True)
+    print(f"results: {len(chosen)} of {len(known)} {'to make' if options.list else 'made'}")
+
+
+if __name__ == "__main__":
+    main()
