@@ -11,10 +11,12 @@ from typing import Annotated
 import typer
 
 from ..model.runtime.termination import undone
+from ..sim.pictures import FILM
 from ..sim.rtl.waveform import vcd_to_fst
+from ..sim.scene.schema import Scene
 from ..sim.scene.several import AxesScene
 from ..sim.scene.tables import load_any
-from ..sim.walls import hit, hit_axes
+from ..sim.walls import hit, hit_axes, hit_beside
 from .errors import BadInput
 from .options import BackendOption, EstimatorOption, OutputOption, output_file
 from .scenes import SceneArgument
@@ -34,6 +36,9 @@ def command(
     trace: Annotated[
         Path | None, typer.Option(metavar="FILE", help=".npz: the samples; .fst: a waveform of the contact (rtl)")
     ] = None,
+    beside: Annotated[
+        str | None, typer.Option(metavar="SCENE", help="another scene to hit, too; --plot then takes .gif as well")
+    ] = None,
 ) -> None:
     changes = options.changes(
         controller__estimator=estimator,
@@ -42,6 +47,11 @@ def command(
         wall__damping_n_s_per_m=damping,
     )
     of = load_any(scene, changes)
+    if beside is not None:
+        _hit_beside(options, (of, load_any(beside, changes)), backend, trace)
+        return
+    if options.plot and options.plot.suffix == FILM:
+        raise BadInput(f"--plot {options.plot.name} needs --beside: only hits side by side are drawn in motion")
     trace = output_file(trace, "--trace", (".fst", ".npz"))
     waveform = trace if trace and trace.suffix == ".fst" else None
     if waveform and backend != "rtl":
@@ -63,6 +73,19 @@ def _hit_axes(options: StudyOptions, scene: AxesScene, backend: str, trace: Path
     with progress(f"{scene.name} {scene.spec.estimator} {backend}", scene.samples * len(scene.axes)) as advance:
         result = hit_axes.run(scene, backend, bool(options.plot or trace), advance)
     replace(options, command="hit_axes").finish(result, {"trace": (trace, result.save)} if trace else {})
+
+
+def _hit_beside(options: StudyOptions, scenes: tuple[Scene | AxesScene, ...], backend: str, trace: Path | None) -> None:
+    """Hit the walls of two scenes, whose result has a picture of its own, which may move."""
+    for each in scenes:
+        if isinstance(each, AxesScene):
+            raise BadInput(f"--beside puts hits of one axis side by side, and {each.name} has several")
+    if trace:
+        raise BadInput("--trace must be absent with --beside: the traces of each hit go to a file of their own")
+    samples = sum(each.samples for each in scenes)
+    with progress(f"{' beside '.join(each.name for each in scenes)} {backend}", samples) as advance:
+        result = hit_beside.run(scenes, backend, bool(options.plot), advance)
+    replace(options, command="hit_beside").finish(result)
 
 
 @contextmanager

@@ -37,7 +37,7 @@ class ReportOptions:
     def __post_init__(self):
         # A picture that cannot be written, or drawn, is reported before anything long begins.
         if self.plot:
-            output_file(self.plot, "--plot", _pictures("").SUFFIXES)
+            output_file(self.plot, "--plot", _pictures("").suffixes_of(self.command))
             if find_spec("matplotlib") is None:
                 raise ModuleNotFoundError("nothing draws", name="matplotlib")
 
@@ -71,7 +71,13 @@ class ReportOptions:
     def _draw(self, result: Result, path: Path) -> None:
         """Draw a result, which may have several pictures, and so several files."""
         _make_folder_of(path)
-        for each in _pictures(".style").save_all(_pictures(f".{self.command}").draw(result), path):
+        module = _pictures(f".{self.command}")
+        if path.suffix == _pictures("").FILM:
+            module.film(result, path)
+            paths = [path]
+        else:
+            paths = _pictures(".style").save_all(module.draw(result), path)
+        for each in paths:
             _say("picture", each)
 
 

@@ -5,6 +5,7 @@ loop without them, with either, and with both shows which of them ends the gain.
 """
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 from ...model.runtime.result import Table, table_of
@@ -116,9 +117,10 @@ class Rates:
     effort: Effort
 
     def report(self) -> dict[str, Any]:
-        """Return what the command line prints, units in the keys."""
+        """Return what the command line prints, units in the keys; a limit that is not found is None."""
         methods = [each.report() for each in self.gains]
-        return self.effort._asdict() | {"methods": methods, "linear_limits": self.limits}
+        limits = {parts: [k if isfinite(k) else None for k in limit] for parts, limit in self.limits.items()}
+        return self.effort._asdict() | {"methods": methods, "linear_limits": limits}
 
     def tables(self) -> list[Table]:
         """Return the table of the largest K by rate."""

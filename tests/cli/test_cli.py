@@ -107,6 +107,12 @@ OF_ONE_AXIS_ALONE = ("bench", "cutoff", "drop", "fit", "gains", "lipschitz", "ra
             ["table", "no-such.json"],
             "'no-such.json' must be a JSON report of `hardwall hit --json`, and is none: No such file",
         ),
+        (["hit", "--beside", "no-such"], "scene must be one of "),
+        (["hit", "--beside", "eight-axes"], "--beside puts hits of one axis side by side, and eight-axes has several"),
+        (["hit", "eight-axes", "--beside", "mhz"], "side by side, and eight-axes has several"),
+        (["hit", "--beside", "mhz", "--trace", "a.npz"], "--trace must be absent with --beside"),
+        (["hit", "--plot", "a.gif"], "--plot a.gif needs --beside: only hits side by side are drawn in motion"),
+        (["rates", "--plot", "a.gif"], "--plot must end in .pdf or .png or .svg, not 'a.gif'"),
         (["shoot"], "the command must be one of hit, replay, "),
     ],
 )
@@ -223,6 +229,18 @@ def test_what_is_not_for_several_axes_says_so_in_a_line(monkeypatch, capsys, tmp
     code, out, err = call(monkeypatch, capsys, command, "eight-axes", *options, *folder)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert message in err
+
+
+def test_hits_of_two_scenes_are_side_by_side_in_report_table_and_film(monkeypatch, capsys, tmp_path):
+    short = [word for key in ("settle_s=0.7", "mean_s=0.1", "measure_s=0.1") for word in ("--set", f"protocol.{key}")]
+    two = ["hit", "seed-2011", "--beside", "fit-2011", "--estimator", "fdm", *short]
+    code, out, err = call(monkeypatch, capsys, *two, "--json", "--plot", tmp_path / "two.gif")
+    assert code == 0, err
+    assert [row["scene"] for row in json.loads(out)["rows"]] == ["seed-2011", "fit-2011"]
+    assert (tmp_path / "two.gif").read_bytes().startswith(b"GIF89a")
+    (tmp_path / "two.json").write_text(out)
+    _, out, _ = call(monkeypatch, capsys, "table", tmp_path / "two.json")
+    assert out.count("fdm u, fixed") == 2
 
 
 def test_table_puts_reports_side_by_side(monkeypatch, capsys, tmp_path):

@@ -1,6 +1,8 @@
 """The schema of the JSON reports: it is a schema, has every command that prints JSON, and fits every study's result."""
 
 import inspect
+import math
+from dataclasses import replace
 from importlib import import_module
 
 import pytest
@@ -56,6 +58,20 @@ def test_the_hits_of_several_axes_are_as_their_schema_says():
     for wrong in ({"axis": None}, {"rms_mm": -1.0}, {"more": 1}):
         with pytest.raises(AssertionError, match=r"^hit: "):
             check("hit", report | {"rows": [first | wrong, *others]})
+
+
+def test_a_linear_loop_without_a_limit_has_null_in_the_report_of_rates():
+    made = results.rate_gains()
+    report = replace(made, limits=made.limits | {"rigid": [1e5, 1e6, math.inf]}).report()
+    check("rates", report)
+    assert report["linear_limits"]["rigid"] == [1e5, 1e6, None]
+
+
+def test_hits_side_by_side_are_as_their_schema_says():
+    report = results.hit_beside().report()
+    check("hit", report)
+    with pytest.raises(AssertionError, match=r"^hit: "):
+        check("hit", {"rows": report["rows"][:1]})
 
 
 def test_what_is_not_as_the_schema_says_is_found():

@@ -8,6 +8,7 @@ import pytest
 from matplotlib.axis import Tick
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from PIL import Image
 
 from hardwall.sim.estimates import figures
 from hardwall.sim.estimates.replay import replay
@@ -20,6 +21,7 @@ from hardwall.sim.pictures import (
     gains,
     hit,
     hit_axes,
+    hit_beside,
     lipschitz,
     rates,
     rendered,
@@ -45,6 +47,18 @@ def figure_1() -> Figure:
     return accuracy.draw(Accuracy(1, curves, rows, [curve.label for curve in curves]))
 
 
+def errors_at_rates() -> dict:
+    """Return a report of errors, of which that of fdm grows with the rate; the others fall, levant's u1 most."""
+    ends = {("fdm", "u"): (0.4, 100.0), ("butterworth", "u"): (0.3, 0.2), ("levant", "u1"): (2.0, 0.1)}
+    return {
+        "rows": [
+            {"estimator": name, "output": output, "sample_hz": hz, "rms_mm_s": error}
+            for (name, output), errors in ends.items()
+            for hz, error in zip((1_000, 1_000_000), errors, strict=True)
+        ]
+    }
+
+
 def every_estimator_mapped() -> Figure:
     return zwidth.draw(
         results.zwidth([results.map_of(name, 2e4, 200) for name in ("fdm-30", "fdm-100", "adjusted")] * 4)
@@ -56,6 +70,7 @@ PICTURES = {
     "hit, unstable": lambda: hit.draw(results.hit(4.2e-6)),
     "hit, never reached": lambda: hit.draw(results.hit(reached=False)),
     "hit of several axes": lambda: hit_axes.draw(results.hit_axes()),
+    "hits side by side": lambda: hit_beside.draw(results.hit_beside()),
     "replay": lambda: replayed.draw(replay(swing(), coarsen=COARSEN, acceleration_max_counts_per_s2=BOUND)),
     "figure 1": figure_1,
     "figure 2": lambda: accuracy.draw(results.rows()),
@@ -66,6 +81,7 @@ PICTURES = {
     "gains": lambda: gains.draw(results.search()),
     "lipschitz": lambda: lipschitz.draw(results.fit()),
     "rates": lambda: rates.draw(results.rate_gains()),
+    "rates beside errors": lambda: rates.draw_beside_errors(errors_at_rates(), results.rate_gains().report()),
     **{
         f"rendered, {name}": lambda name=name: rendered.draw(results.rendered_walls())[name]
         for name in ("impedance", "contact")
@@ -176,6 +192,70 @@ def test_every_axis_has_its_row_with_its_name_and_its_verdict():
         "unstable, at rest"
     ]
     assert "6 of 8 walls are stable" in figure.get_suptitle()
+
+
+def test_hits_side_by_side_say_what_they_do():
+    figure = hit_beside.draw(results.hit_beside())
+    left, right = figure.axes[:2]
+    said = [panel.get_title(loc="left") for panel in (left, right)]
+    assert said == ["Force at 1 kHz: it bounces", "Force at 1 MHz: it stands"]
+    verdicts = [panel.get_title(loc="right") for panel in figure.axes[2:4]]
+    assert verdicts == ["verdict: unstable, RMS 4.2 µm", "verdict: stable, at rest"]
+    loops = [panel.texts[0].get_text() for panel in (left, right)]
+    assert loops == [
+        "levant: velocity at 10 kHz, force at 1 kHz, 1 ms late",
+        "levant: velocity at 1 MHz, force at 1 MHz",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"judged": "undecided"}, "undecided"),
+        ({"touched": False}, "never touched"),
+        ({"judged": "stable"}, "it stands"),
+    ],
+)
+def test_the_headline_of_a_hit_is_its_verdict(change, said):
+    made = results.hit_beside()
+    figure = hit_beside.draw(replace(made, hits=(replace(made.hits[0], **change), made.hits[1])))
+    assert figure.axes[0].get_title(loc="left") == f"Force at 1 kHz: {said}"
+
+
+def test_a_handle_that_stays_within_an_unstable_wall_buzzes():
+    made = results.hit_beside()
+    first = made.hits[0]
+    inside = replace(first.overview, position_m=np.abs(first.overview.position_m))
+    figure = hit_beside.draw(replace(made, hits=(replace(first, overview=inside), made.hits[1])))
+    assert figure.axes[0].get_title(loc="left") == "Force at 1 kHz: it buzzes"
+
+
+def test_a_film_goes_on_in_real_time_and_always_is_the_same(tmp_path, monkeypatch):
+    monkeypatch.setattr(hit_beside, "FRAME_S", 0.5)
+    made = results.hit_beside()
+    for name in ("one.gif", "two.gif"):
+        hit_beside.film(made, tmp_path / name)
+    assert (tmp_path / "one.gif").read_bytes() == (tmp_path / "two.gif").read_bytes()
+    with Image.open(tmp_path / "one.gif") as film:
+        assert film.width == hit_beside.FILM_PX
+        assert film.info["loop"] == 0
+        lasts_ms = []
+        for number in range(film.n_frames):
+            film.seek(number)
+            lasts_ms.append(film.info["duration"])
+    end_ms = made.hits[0].overview.time_s[-1] * 1e3
+    assert sum(lasts_ms) == pytest.approx(end_ms + hit_beside.HOLD_S * 1e3, abs=hit_beside.FRAME_S * 1e3)
+    assert lasts_ms[-1] >= hit_beside.HOLD_S * 1e3
+
+
+def test_the_rates_beside_errors_say_what_the_numbers_say():
+    report = results.rate_gains().report()
+    for label, method in zip(("butterworth", "levant u1"), report["methods"], strict=True):
+        method |= {"label": label, "rates_hz": [1_000, 1_000_000]}
+        method["largest_stiffness_n_per_m"] = [2e5, 3e5] if label == "levant u1" else [1e5, 4e5]
+    first, second = rates.draw_beside_errors(errors_at_rates(), report).get_suptitle().split("\n")
+    assert first == "From 1 kHz to 1 MHz the error of fdm grows 250 times, and levant u1 gets 20 times better"
+    assert "less error than levant u1 up to 1 kHz, and stiffer walls at 1 MHz" in second
 
 
 def test_the_whole_run_shows_what_happens_between_its_points():

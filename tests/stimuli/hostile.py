@@ -43,10 +43,11 @@ STEMS = (
     *("", "out", "folder", "pipe", "absent/deep/out", "/dev/out", "/proc/x/out", "a" * 300, "b" * 5000, "new\nline"),
     *("two words", "\udcff"),
 )
-SUFFIXES = (".png", ".svg", ".pdf", ".csv", ".npz", ".fst", ".json", ".toml", ".PNG", ".", "")
+SUFFIXES = (".png", ".svg", ".pdf", ".gif", ".csv", ".npz", ".fst", ".json", ".toml", ".PNG", ".", "")
 
 GOOD: dict[str, tuple[str, ...]] = {
     "scene": (*names(), "scene.toml"),
+    "beside": ("seed-2011", "fit-2011"),
     "estimator": tuple(registry.ESTIMATORS),
     "wanted": ("levant", "levant:u1", "fdm,kalman", "proposed", "fdm-500", "all"),
     "output": ("u", "u1", "best-fit"),

@@ -23,6 +23,7 @@ from hardwall.sim.walls.chatter import Chatter
 from hardwall.sim.walls.edge_shift import Move
 from hardwall.sim.walls.hit import Hit
 from hardwall.sim.walls.hit_axes import AxesHit
+from hardwall.sim.walls.hit_beside import Beside
 from hardwall.sim.walls.mapping import Effort
 from hardwall.sim.walls.methods import methods
 from hardwall.sim.walls.zwidth import Map
@@ -55,6 +56,11 @@ def hit(rms_m: float = 0.0, reached: bool = True) -> Hit:
     overview = Overview(*vars(whole).values(), wrong - 0.02, wrong + 0.02, whole.force_n, whole.force_n)
     kept = {"overview": overview, "detail": contact}
     return Hit(load("seed-2011"), "fixed", rms_m=rms_m, flags=[], force_sha256="0" * 64, **run, **kept)
+
+
+def hit_beside() -> Beside:
+    """Return an unstable hit on seed-2011 beside a stable one on mhz."""
+    return Beside((hit(4.2e-6), replace(hit(), scene=load("mhz"))))
 
 
 def hit_axes() -> AxesHit:
