@@ -40,9 +40,13 @@ def with_words(d: period_count.Design, plain, random: Random):
 
 
 def at_the_switch(d: period_count.Design):
-    """Yield rows without edges whose windows are decided by one bit: counting begins with it, and goes on with it."""
+    """Yield rows without edges whose windows are decided by one bit: counting begins with it, and goes on with it.
+
+    Two of them more are of the largest speed that the format has, and of the next.
+    """
     window, half, most = 1 << d.window_bits, 1 << (d.count_width - 1), d.switch.format.max
-    for size in (1 << bit for bit in range(d.count_width)):
+    largest = d.velocity.max * window >> d.velocity.f
+    for size in (*(1 << bit for bit in range(d.count_width)), largest, largest + 1):
         for way in (size, -size):
             for k in range(2 * window + 1):
                 count = k // window * way
