@@ -127,8 +127,8 @@ figures: $(VENV)/.synth | tools ## the founding paper's figures and every study 
 panel: $(VENV)/.panel | tools ## feel a wall: a board in simulation, behind a page in the browser
 	@$(HARDWALL) panel virtual
 
-browser: $(VENV)/.test | tools ## the panel's page in a real browser, beside a board in simulation (some minutes, alone on the machine)
-	@HARDWALL_BROWSER=1 $(RUN) pytest -n 0 tests/host/panel/test_page.py $(ARGS)
+browser: $(VENV)/.test docs | tools ## the panel's page in a real browser, beside a board in simulation; and the pages (some minutes, alone on the machine)
+	@HARDWALL_BROWSER=1 $(RUN) pytest -n 0 tests/host/panel/test_page.py tests/test_site.py $(ARGS)
 
 screenshots: $(VENV)/.test | tools ## the pictures of the panel's page, anew, by a browser
 	@$(IN_TESTS) support.screenshots

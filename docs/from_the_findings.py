@@ -1,7 +1,7 @@
 """What pages take from `tests/signoff/findings/`, which the tasks that sign the hardware off write.
 
-A line `%findings mutate%` in a page becomes the table of what that task has kept. A task that has kept nothing is a
-warning, and so fails the build.
+A line `%findings mutate%` in a page becomes the table of what that task has kept, and `%findings every-fault%` a table
+of every fault for each drive stage. A task that has kept nothing is a warning, and so fails the build.
 """
 
 import json
@@ -15,10 +15,16 @@ from from_the_program import cell, table
 from sphinx.application import Sphinx
 from sphinx.util import logging
 
+from hardwall.model.axis.supervisor import CAUSES
+
 log = logging.getLogger(__name__)
 FINDINGS = Path(__file__).parent.parent / "tests" / "signoff" / "findings"
 KINDS = ("line", "branch", "toggle")
 CELLS = ("lut4", "ff", "dsp", "bram")
+CAME = [*(cause.name for cause in CAUSES), "DISARMED", "no clock", "ARMED"]
+"""What may come of a fault, in the order of the tables."""
+CLOCKS_PER_US = 12
+"""Clocks of the board with faults: `CLOCK_HZ` in `tests/signoff/injection/scene.py`."""
 
 
 def proofs(found: dict[str, Any]) -> list[str]:
@@ -30,11 +36,16 @@ def proofs(found: dict[str, Any]) -> list[str]:
     return table(["block and property", "seconds", "its bugs fail at clock"], rows)
 
 
-def faults(found: dict[str, Any]) -> list[str]:
-    """Return a table of the stages: how many faults were injected, and what the worst of them did."""
+def _by_stage(found: dict[str, Any]) -> dict[str, list[dict[str, Any]]]:
+    """Return the outcomes of the faults of every drive stage."""
     stages: dict[str, list[dict[str, Any]]] = {}
     for name, outcome in found.items():
         stages.setdefault(name.partition(": ")[0], []).append(outcome)
+    return stages
+
+
+def faults(found: dict[str, Any]) -> list[str]:
+    """Return a table of the stages: how many faults were injected, and what the worst of them did."""
     rows = [
         [
             cell(stage),
@@ -44,10 +55,35 @@ def faults(found: dict[str, Any]) -> list[str]:
             str(max(outcome["clocks"] or 0 for outcome in every)),
             f"{max(outcome['largest_n'] for outcome in every):.1f}",
         ]
-        for stage, every in stages.items()
+        for stage, every in _by_stage(found).items()
     ]
     heads = ["drive stage", "faults", "safe", "drive brought down", "in at most, clocks", "largest force, N"]
     return table(heads, rows)
+
+
+def every_fault(found: dict[str, Any]) -> list[str]:
+    """Return a table for each drive stage: every fault, what came of it, and what is promised; first what trips."""
+    heads = ["fault", "what came", "promised", "clocks", "µs", "largest force, N", "impulse, mN s", "over, ms"]
+    lines = []
+    for stage, every in _by_stage(found).items():
+        ordered = sorted(every, key=lambda outcome: (CAME.index(outcome["came"].partition(" + ")[0]), outcome["name"]))
+        lines += [f"### `{stage}`", "", *table(heads, [_fault(outcome) for outcome in ordered]), ""]
+    return lines
+
+
+def _fault(outcome: dict[str, Any]) -> list[str]:
+    """Return the row of a fault."""
+    clocks, impulse = outcome["clocks"], outcome["impulse_n_s"] * 1e3
+    promised = outcome["expected"].partition(", ")[2]
+    return [
+        cell(outcome["name"]),
+        outcome["came"] if not outcome["wrong"] else f"{outcome['came']} (not safe)",
+        promised,
+        *(("", "") if clocks is None else (str(clocks), f"{clocks / CLOCKS_PER_US:.{2 if clocks < 1000 else 0}f}")),
+        f"{outcome['largest_n']:.1f}",
+        f"{impulse:.{3 if impulse < 10 else 0}f}",
+        f"{outcome['observed_ms']:.0f}",
+    ]
 
 
 def netlists(found: dict[str, Any]) -> list[str]:
@@ -82,28 +118,31 @@ def mutants(found: dict[str, Any]) -> list[str]:
     return table(["block", "mutants", "killed", "equivalent", "left", "killed of the others, %"], rows)
 
 
-TABLES: dict[str, Callable[[dict[str, Any]], list[str]]] = {
-    "prove": proofs,
-    "faults": faults,
-    "gate": netlists,
-    "coverage": coverage,
-    "mutate": mutants,
+TABLES: dict[str, tuple[str, Callable[[dict[str, Any]], list[str]]]] = {
+    "prove": ("prove", proofs),
+    "faults": ("faults", faults),
+    "every-fault": ("faults", every_fault),
+    "gate": ("gate", netlists),
+    "coverage": ("coverage", coverage),
+    "mutate": ("mutate", mutants),
 }
+"""The tables by their names in a page: the task whose findings they show, and what makes them."""
 
 
-def told(task: str) -> str:
-    """Return the table of what a task has kept."""
+def told(name: str) -> str:
+    """Return a table of what its task has kept."""
+    task, made = TABLES[name]
     files = [json.loads(file.read_text(encoding="utf-8")) for file in (FINDINGS / task).rglob("*.json")]
     if not files:
         log.warning("nothing is kept of make %s", task)
         return ""
-    kept = sorted((name, each["found"]) for file in files for name, each in file.items())
-    return "\n".join(TABLES[task](dict(kept)))
+    kept = sorted((of, each["found"]) for file in files for of, each in file.items())
+    return "\n".join(made(dict(kept)))
 
 
 def fill(_: Sphinx, __: str, source: list[str]) -> None:
     """Put the tables where a page wants them."""
-    source[0] = re.sub(r"^%findings (\w+)%$", lambda wanted: told(wanted[1]), source[0], flags=re.MULTILINE)
+    source[0] = re.sub(r"^%findings ([\w-]+)%$", lambda wanted: told(wanted[1]), source[0], flags=re.MULTILINE)
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

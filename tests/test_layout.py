@@ -291,7 +291,8 @@ def test_what_is_imported_is_what_its_extra_installs(path):
     pinned = [CONFIG["project"]["dependencies"], *(EXTRAS[extra] for extra in extras)]
     installed = {plain(requirement.partition("==")[0]) for one in pinned for requirement in one}
     installed.add("llvmlite")  # a dependency of Numba
-    ours = {"hardwall", *(test.stem for test in TESTS), *(test.parent.name for test in TESTS)}
+    pages = (page.stem for page in (ROOT / "docs").glob("*.py"))
+    ours = {"hardwall", *pages, *(test.stem for test in TESTS), *(test.parent.name for test in TESTS)}
     foreign = {name.partition(".")[0] for name in imports(path)} - ours - set(sys.stdlib_module_names)
     assert {name for name in foreign if not installed & {plain(each) for each in PROVIDERS.get(name, [])}} == set()
 

@@ -90,7 +90,7 @@ OF_ONE_AXIS_ALONE = ("bench", "cutoff", "drop", "fit", "gains", "lipschitz", "ra
         (["hit", "--estimator", "nobody"], "--estimator must be one of fdm, levant, "),
         (["hit", "--backend", "vhdl"], "--backend must be one of float, fixed, rtl, not 'vhdl'"),
         (["hit", "--stiffness", "stiff"], "--stiffness"),
-        (["hit", "--plot", "hit.bmp"], "--plot must end in .pdf or .png or .svg, not 'hit.bmp'"),
+        (["hit", "--plot", "hit.bmp"], "--plot must end in .pdf or .png or .svg or .gif, not 'hit.bmp'"),
         (["hit", "--trace", "hit.vcd"], "--trace must end in .fst or .npz, not 'hit.vcd'"),
         (["hit", "--plot", "/proc/none/hit.png"], "--plot '/proc/none/hit.png' cannot be written"),
         (["hit", "--trace", "hit.fst", "--backend", "fixed"], "--trace hit.fst needs --backend rtl"),

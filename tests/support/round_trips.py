@@ -1,4 +1,4 @@
-"""The round trips of *The link*: from the first bit of a request to the last of its answer, in the board's time.
+"""Round trips: from the first bit of a request to the last of its answer, in the time of the board.
 
     PYTHONPATH=tests .venv/bin/python -m support.round_trips
 
