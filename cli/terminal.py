@@ -120,7 +120,8 @@ def hear_stages() -> None:
 class progress:
     """The progress of a run on stderr: a bar in a terminal, elsewhere a line every `SILENCE_S`.
 
-    As a context it returns the function to call with the amount done.
+    As a context it returns the function to call with the amount done. The bar comes with the first amount, so that a
+    run that is refused before leaves one line alone.
     """
 
     def __init__(self, title: str, total: int):
@@ -130,13 +131,14 @@ class progress:
         self._task = self._bar.add_task(escape(self._title), total=total)
 
     def __enter__(self):
-        self._bar.start()
         return self._done
 
     def __exit__(self, *_) -> None:
-        self._bar.stop()
+        if self._bar.live.is_started:
+            self._bar.stop()
 
     def _done(self, done: float) -> None:
+        self._bar.start()
         self._bar.update(self._task, completed=done)
         now = time.monotonic()
         if not log.is_terminal and now - self._said >= SILENCE_S:

@@ -6,10 +6,12 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from hardwall.cli import terminal
 from hardwall.cli.report import ReportOptions, _do_all, _write
@@ -24,6 +26,7 @@ from support.processes import HARDWALL, ended, started, wait_until
 
 DRAWING = """
 import sys, time
+from contextlib import suppress
 from pathlib import Path
 from hardwall.cli.app import main
 from hardwall.sim.pictures import style
@@ -89,6 +92,16 @@ def test_what_a_run_says_of_a_name_stays_on_a_line(monkeypatch, capsys):
     with terminal.progress("a\nb.csv", 2) as advance:
         advance(1)
     assert capsys.readouterr().err == "compiling a\\nb ...\na\\nb.csv: 50%\n"
+
+
+@pytest.mark.parametrize("begun", [False, True])
+def test_a_bar_comes_with_the_first_amount_so_that_what_is_refused_before_is_one_line(monkeypatch, capsys, begun):
+    monkeypatch.setattr(terminal, "log", Console(stderr=True, force_terminal=True))
+    with suppress(ValueError), terminal.progress("a.csv", 2) as advance:
+        if begun:
+            advance(1)
+        raise ValueError
+    assert bool(capsys.readouterr().err) == begun
 
 
 def test_a_folder_that_went_meanwhile_is_an_error_in_a_line(tmp_path):
