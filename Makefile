@@ -3,7 +3,8 @@
 #   PYTHON=python3.13         another interpreter; .venv is made anew when it changes
 #   ARGS="-k levant"          more options for pytest (test, soak, fuzz)
 #   ONLY=hit/mhz              the beginning of the names of the cases to record anew (digests), or of what is checked
-#                             (prove, faults, gate, coverage, mutate)
+#                             (prove, faults, gate, coverage, mutate); the reports to make (results)
+#   LIST=1                    only say which reports are stale (results)
 #   AGAIN=1                   find anew what is kept in tests/signoff/findings/ (the same five)
 #   SEEDS="1 2" SAMPLES=10000 ENDURANCE=1000000
 #                             the seeds, the samples for every seed, and the samples of endurance (soak)
@@ -34,7 +35,6 @@ REPORTS := $(ESTIMATORS:%=build/hit-%.json) $(ESTIMATORS:%=build/mhz-%.json)
 PICTURES := $(REPORTS:%.json=%.png)
 # One more wall, at two rates, in one picture.
 TWO_RATES := build/hit-two-rates.png
-BESIDE = $(HARDWALL) hit seed-2011 --beside mhz --stiffness 50e3 --damping 20 --plot
 
 # What `make synth` compares, one part of each kind, and the boards that `make boards` builds for.
 DEVICES := ecp5-25k ice40-up5k gw1nr-9
@@ -48,9 +48,6 @@ MAPPED := seed-2011 fit-2011 drive-2011
 STUDIES := cutoff gains drop trade
 # Above them a hit takes long: the whole study takes hours.
 RATES := 1e3,2.5e3,1e4,2.5e4,1e5
-# What the README shows of them, and of the walls.
-SEEN := fdm,butterworth,kalman,levant:u1
-COARSE := $(addprefix --set zwidth., stiffness_step_n_per_m=20e3 damping_from_n_s_per_m=30 damping_step_n_s_per_m=60)
 
 SEEDS ?= $(shell shuf -i 1-999999999 -n 3)
 SAMPLES ?= 1000000
@@ -63,7 +60,7 @@ PYTEST = $(RUN) pytest -n $(if $(filter 1 2 3 4 5 6 7,$(CORES)),$$(($(CORES) + 1
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures panel browser screenshots verilog docs diagrams results sight digests soak fuzz clean distclean help tools FORCE
+.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures panel browser screenshots verilog docs diagrams results digests soak fuzz clean distclean help tools FORCE
 
 all: $(REPORTS) $(PICTURES) $(TWO_RATES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
@@ -143,16 +140,9 @@ docs: $(VENV)/.docs | tools ## the pages as a site in build/docs, every link ins
 diagrams: $(VENV)/.docs | tools ## draw the diagrams of the pages anew, from the code that they show
 	@$(RUN) docs.diagrams.draw
 
-results: $(VENV)/.docs | tools ## the reports of the pages of results: those whose sources have changed, or ONLY="NAMES" (an hour and more)
-	@$(VENV)/bin/python docs/reports.py $(ONLY)
-	@$(VENV)/bin/python docs/in_readme.py
-
-sight: $(VENV)/.test | tools ## the pictures of the README anew: two hits side by side, and what rate buys (half an hour)
-	@$(BESIDE) docs/pictures/hit.gif >/dev/null
-	@$(BESIDE) docs/pictures/hit-two-rates.png >/dev/null
-	@$(HARDWALL) accuracy --estimators $(SEEN),edge-kalman --rates 1e3,2.5e3,1e4,2.5e4,1e5,2.5e5,1e6 --json >build/accuracy.json
-	@$(HARDWALL) rates --estimators $(SEEN) --rates 1e3,1e4,1e5,1e6 --starts 1 --resume $(COARSE) --json >build/rates.json
-	@$(IN_TESTS) support.rate_buys build/accuracy.json build/rates.json docs/pictures/rate-buys.png
+results: $(VENV)/.docs | tools ## the reports of pages and README: those whose sources have changed, or ONLY="NAMES" (half an hour)
+	@PYTHONPATH=tests $(VENV)/bin/python docs/reports.py $(if $(LIST),--list) $(ONLY)
+	@PYTHONPATH=tests $(VENV)/bin/python docs/for_readme.py
 
 digests: $(VENV)/.test | tools ## record anew what the program computes, and show what changed (after a change on purpose)
 	@$(IN_TESTS) support.digests $(ONLY)
@@ -196,7 +186,7 @@ endef
 $(TWO_RATES): $(SOURCES) $(VENV)/.sim | tools
 	@mkdir -p build
 	@echo "Hitting another wall at two rates, side by side ..."
-	@$(BESIDE) $@ >/dev/null
+	@$(HARDWALL) hit seed-2011 --beside mhz --stiffness 50e3 --damping 20 --plot $@ >/dev/null
 
 build/hit-%.json build/hit-%.png: $(SOURCES) $(VENV)/.sim | tools
 	$(call hit,$(SCENE),rtl,the generated hardware)

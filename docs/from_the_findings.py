@@ -4,11 +4,9 @@ A line `%findings mutate%` in a page becomes the table of what that task has kep
 of every fault for each drive stage. A task that has kept nothing is a warning, and so fails the build.
 """
 
-import json
 import re
 from collections import Counter
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from from_the_program import cell, table
@@ -16,9 +14,9 @@ from sphinx.application import Sphinx
 from sphinx.util import logging
 
 from hardwall.model.axis.supervisor import CAUSES
+from signoff.kept import OURS, Findings
 
 log = logging.getLogger(__name__)
-FINDINGS = Path(__file__).parent.parent / "tests" / "signoff" / "findings"
 KINDS = ("line", "branch", "toggle")
 CELLS = ("lut4", "ff", "dsp", "bram")
 CAME = [*(cause.name for cause in CAUSES), "DISARMED", "no clock", "ARMED"]
@@ -132,12 +130,11 @@ TABLES: dict[str, tuple[str, Callable[[dict[str, Any]], list[str]]]] = {
 def told(name: str) -> str:
     """Return a table of what its task has kept."""
     task, made = TABLES[name]
-    files = [json.loads(file.read_text(encoding="utf-8")) for file in (FINDINGS / task).rglob("*.json")]
-    if not files:
+    kept = Findings(OURS / task).every()
+    if not kept:
         log.warning("nothing is kept of make %s", task)
         return ""
-    kept = sorted((of, each["found"]) for file in files for of, each in file.items())
-    return "\n".join(made(dict(kept)))
+    return "\n".join(made({of: each["found"] for of, each in kept.items()}))
 
 
 def fill(_: Sphinx, __: str, source: list[str]) -> None:

@@ -1,13 +1,12 @@
 """The reports that pages of results are made of: which command makes each, and whether its sources have changed since.
 
-`docs/results/reports.toml` names them. `python docs/reports.py` runs the commands whose report is stale, or of those
-named; `--list` only says which are, and how long each took. A report is kept as `docs/results/reports/NAME.json`, with
+`docs/results/reports.toml` names them. `make results` runs the commands whose report is stale, or of those named by
+`ONLY`; `LIST=1` only says which are, and how long each took. A report is kept as `docs/results/reports/NAME.json`, with
 its command, the version, the date and the machine. Its origin is a digest of the code of every module that the command
 imports, but for those that only show or keep what was computed; comments and docstrings are no part of it.
 """
 
 import argparse
-import ast
 import datetime
 import functools
 import hashlib
@@ -25,12 +24,13 @@ from pathlib import Path
 from typing import Any
 
 from hardwall.model.runtime.provenance import imported
+from signoff.covering.sources import code_of
 
 DOCS = Path(__file__).absolute().parent
 TREE = DOCS.parent
 LIST, KEPT, PICTURES = DOCS / "results/reports.toml", DOCS / "results/reports", DOCS / "pictures"
 SHOWING = "cli", "model/runtime", "sim/jobs", "sim/pictures"
-"""Rooms that change no number."""
+"""Rooms that change no number, but for the command itself."""
 HARDWARE = "hdl", "sim/boards", "sim/rtl"
 """Rooms that matter to what runs the RTL, or counts its cells."""
 OF_HARDWARE = "bench", "board", "choose", "costs", "synth"
@@ -100,17 +100,6 @@ def is_stale(report: Wanted) -> bool:
     return found is None or (found.command, found.origin) != (f"hardwall {report.command}", origin(report.command))
 
 
-@functools.cache
-def _code_of(file: Path) -> str:
-    """Return a source without its comments and docstrings."""
-    tree = ast.parse(file.read_bytes())
-    for node in ast.walk(tree):
-        documented = isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
-        if documented and ast.get_docstring(node, clean=False) is not None:
-            node.body = node.body[1:] or [ast.Pass()]
-    return ast.unparse(tree)
-
-
 def _files(name: str) -> Iterator[Path]:
     """Yield the file of a module of the project."""
     inside = TREE.joinpath(*name.split(".")[1:])
@@ -123,14 +112,16 @@ def sources_of(command: str) -> list[Path]:
     words = shlex.split(command)
     hardware = words[0] in OF_HARDWARE or "rtl" in words
     others = (*SHOWING, *(() if hardware else HARDWARE))
-    waiting, seen = [TREE / "cli" / f"{words[0]}.py"], set[Path]()
+    own = TREE / "cli" / f"{words[0]}.py"
+    waiting, seen = [own], set[Path]()
     while waiting:
         file = waiting.pop()
         if file not in seen:
             seen.add(file)
             package = ".".join(["hardwall", *file.relative_to(TREE).parent.parts])
             waiting += (found for name in imported(file.read_bytes(), package) for found in _files(name))
-    return sorted(file for file in seen if not any(file.is_relative_to(TREE / room) for room in others))
+    # Of the command line the command alone has defaults that matter.
+    return sorted(file for file in seen if file == own or not any(file.is_relative_to(TREE / room) for room in others))
 
 
 @functools.cache
@@ -138,7 +129,7 @@ def origin(command: str) -> str:
     """Return a digest of the code that the report of a command comes from, and of the scenes of the project."""
     digest = hashlib.sha256()
     for file in sources_of(command):
-        digest.update(f"{file.relative_to(TREE)}\0{_code_of(file)}\0".encode())
+        digest.update(f"{file.relative_to(TREE)}\0{code_of(file.read_bytes())}\0".encode())
     for scene in sorted((TREE / "sim/scene/builtin").glob("*.toml")):
         digest.update(scene.read_bytes())
     return digest.hexdigest()[:16]
@@ -155,7 +146,7 @@ def make(report: Wanted) -> Kept:
     Raises:
         subprocess.CalledProcessError: if the command fails.
     """
-    began = time.monotonic()
+    began, came_from = time.monotonic(), origin(report.command)
     program = [sys.executable, "-c", "from hardwall.cli.app import main; main()"]
     done = subprocess.run([*program, *report.words], cwd=TREE, stdout=subprocess.PIPE, text=True, check=True)
     made = Kept(
@@ -163,7 +154,7 @@ def make(report: Wanted) -> Kept:
         version=VERSION,
         date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
         machine=machine(),
-        origin=origin(report.command),
+        origin=came_from,
         seconds=round(time.monotonic() - began, 1),
         report=json.loads(done.stdout),
     )

@@ -3,7 +3,16 @@
 from collections.abc import Callable, Iterable
 from typing import Any
 
+import reports
+
+from hardwall.sim.studies.rendered_setting import rate_text
+from support.reports import check
+
 Report = dict[str, Any]
+
+
+class UnknownError(Exception):
+    """There is no such report or view, or the schema of the report's command does not describe it."""
 
 
 def table(heads: Iterable[str], rows: Iterable[Iterable[str]], numbers_from: int = 1) -> list[str]:
@@ -19,14 +28,6 @@ def number(value: float, digits: int = 3) -> str:
     return f"{float(text):.0f}" if "e" in text else text
 
 
-def rate(hertz: float) -> str:
-    """Return a rate with its unit."""
-    for size, unit in ((1e6, "MHz"), (1e3, "kHz")):
-        if hertz >= size:
-            return f"{hertz / size:g} {unit}"
-    return f"{hertz:g} Hz"
-
-
 def errors_by_rate(report: Report) -> list[str]:
     """Return the RMS error of every estimator at every rate, in mm/s."""
     rows = report["rows"]
@@ -34,33 +35,27 @@ def errors_by_rate(report: Report) -> list[str]:
     found = {(row["estimator"], row["output"], row["sample_hz"]): row["rms_mm_s"] for row in rows}
     names = dict.fromkeys((row["estimator"], row["output"]) for row in rows)
     cells = ([f"`{name}` {output}", *(number(found[name, output, each]) for each in rates)] for name, output in names)
-    return table(["estimator", *(f"RMS error at {rate(each)} (mm/s)" for each in rates)], cells)
+    return table(["estimator", *(f"RMS error at {rate_text(each)} (mm/s)" for each in rates)], cells)
 
 
-def areas(report: Report) -> list[str]:
-    """Return the area of the stable walls of every map with its interval, and its largest stiffness."""
-    rows = []
-    for each in report["maps"]:
-        area, low, high = (each[f"area{end}_n2_s_per_m2"] / 1e3 for end in ("", "_low", "_high"))
-        stiffness = each["largest_stiffness_n_per_m"] / 1e3
-        rows.append([each["label"], f"{area:.0f}", f"{low:.0f} to {high:.0f}", f"{stiffness:.0f}"])
-    return table(["estimator", "area (kN/m N s/m)", "95 % interval", "largest K (kN/m)"], rows)
+VIEWS: dict[str, Callable[[Report], list[str]]] = {"errors-by-rate": errors_by_rate}
 
 
-def settings(report: Report) -> list[str]:
-    """Return what every shortcut takes for a hit and for a map, and how far it moves the area of every map."""
-    rows = []
-    for each in report["settings"]:
-        moves = [
-            f"{name} {move['area_ratio']:.2f}{'' if move['moved'] else ' (no move)'}"
-            for name, move in each["moves"].items()
-        ]
-        rows.append([each["axis"], each["label"], number(1e3 * each["hit_s"]), number(each["map_s"]), "; ".join(moves)])
-    return table(["group", "setting", "a hit (ms)", "a map (s)", "area, against the reference"], rows, 2)
+def shown(name: str, view: str) -> list[str]:
+    """Return the lines of a report's table, and where the report comes from.
 
-
-VIEWS: dict[str, Callable[[Report], list[str]]] = {
-    "areas": areas,
-    "errors-by-rate": errors_by_rate,
-    "settings": settings,
-}
+    Raises:
+        UnknownError: see there.
+    """
+    wanted, found = reports.wanted().get(name), reports.kept(name)
+    if wanted is None or found is None:
+        raise UnknownError("no such report was made")
+    if view not in VIEWS:
+        raise UnknownError(f"the view must be one of {', '.join(VIEWS)}")
+    try:
+        check(found.command.split()[1], found.report)
+    except AssertionError as error:
+        raise UnknownError(str(error)) from None
+    made = f"`{found.command}`, version {found.version}, {found.date}, {found.machine}; it took {found.seconds:.0f} s."
+    stale = " **Stale: its sources have changed since.**" if reports.is_stale(wanted) else ""
+    return [*VIEWS[view](found.report), "", f"*{made}*{stale}", ""]

@@ -21,8 +21,11 @@ def test_the_readme_leads_to_every_guide_and_the_first_page_to_every_page():
     guides = {name for name in PAGES if name.startswith("docs/guide/")}
     assert guides - set(re.findall(r"\]\((docs/[\w/-]+\.md)\)", text_of("README.md"))) == set()
     pages = {name.removeprefix("docs/").removesuffix(".md") for name in PAGES if name.startswith("docs/")} - {"index"}
-    listed = re.findall(r"^((?:guide|results|reference)/[\w-]+)$", text_of("docs/index.md"), re.MULTILINE)
+    first = text_of("docs/index.md")
+    listed = re.findall(r"^((?:guide|results|reference)/[\w-]+)$", first, re.MULTILINE)
     assert sorted(listed) == sorted(pages)
+    # The contents are links on the site alone.
+    assert pages - set(re.findall(r"\]\(([\w/-]+)\.md\)", first)) == set()
 
 
 def test_old_addresses_lead_to_pages():

@@ -1,7 +1,9 @@
 """The reports that pages of results are made of: whole, of the schema of their commands, and shown as they are."""
 
 import json
+import re
 import sys
+from dataclasses import replace
 
 import pytest
 
@@ -10,7 +12,7 @@ from support.reports import check
 
 sys.path.insert(0, str(ROOT / "docs"))
 
-import in_readme
+import for_readme
 import reports
 import views
 
@@ -18,13 +20,13 @@ WANTED = reports.wanted()
 KEPT = {name: found for name in WANTED if (found := reports.kept(name))}
 
 
-def test_every_report_that_is_kept_is_wanted_and_shown():
-    files = {path.stem for path in reports.KEPT.iterdir()}
-    assert files == {*KEPT}
-    pages = "".join(text_of(name) for name in PAGES if name.startswith("docs/"))
-    pictures = {name: f"pictures/{each.picture})" for name, each in WANTED.items() if each.picture}
-    shown = [name for name in WANTED if f"%report {name} " in pages or pictures.get(name, "none") in pages]
-    assert shown == [*WANTED]
+def test_every_report_that_is_wanted_is_kept_and_shown():
+    assert {path.stem for path in reports.KEPT.iterdir()} == {*WANTED}
+    pages = "".join(map(text_of, PAGES))
+    pictures = {name: each.picture for name, each in WANTED.items()} | dict.fromkeys(for_readme.DRAWN, "rate-buys.png")
+    assert [
+        name for name in WANTED if not re.search(rf"%report {name} |pictures/{pictures[name] or '-'}\)", pages)
+    ] == []
 
 
 @pytest.mark.parametrize("name", KEPT)
@@ -45,9 +47,9 @@ def test_the_words_of_a_command_are_accepted(name):
 
 def test_the_readme_has_the_numbers_of_the_report():
     text = text_of("README.md")
-    assert len(in_readme.ROW.findall(text)) == 17
-    assert in_readme.filled(text) == text
-    assert in_readme.filled(text.replace("| 4.13 |", "| 5 |")) == text
+    assert len(for_readme.ROW.findall(text)) == 17
+    assert for_readme.filled(text) == text
+    assert for_readme.filled(text.replace("| 4.13 |", "| 5 |")) == text
 
 
 def test_a_report_is_stale_if_its_code_or_its_command_has_changed(monkeypatch, tmp_path):
@@ -67,8 +69,9 @@ def test_a_report_is_stale_if_its_code_or_its_command_has_changed(monkeypatch, t
 
 
 def test_what_only_shows_is_no_source_and_the_hardware_only_of_what_runs_it():
-    rooms = {path.relative_to(ROOT).parts[0] for path in reports.sources_of("accuracy --rates 1e3")}
-    assert rooms == {"model", "sim"}
+    sources = reports.sources_of("accuracy --rates 1e3")
+    assert {path.relative_to(ROOT).parts[0] for path in sources} == {"cli", "model", "sim"}
+    assert [path.name for path in sources if path.is_relative_to(ROOT / "cli")] == ["accuracy.py"]
     assert ROOT / "model/estimators/kalman.py" in reports.sources_of("accuracy")
     assert ROOT / "hdl/axis/axis.py" in reports.sources_of("accuracy --backend rtl")
     assert ROOT / "hdl/axis/axis.py" in reports.sources_of("bench")
@@ -90,17 +93,32 @@ def test_a_report_is_kept_with_where_it_comes_from(monkeypatch, tmp_path):
     assert [row["estimator"] for row in made.report["rows"]] == ["fdm"]
 
 
-def test_views_show_numbers_with_as_many_digits_as_matter():
+def test_numbers_have_as_many_digits_as_matter():
     assert [views.number(value) for value in (131.38, 0.0851, 4.1312, 12345.6)] == ["131", "0.0851", "4.13", "12300"]
-    assert [views.rate(value) for value in (1e6, 10e3, 500)] == ["1 MHz", "10 kHz", "500 Hz"]
-    lines = views.errors_by_rate(KEPT["accuracy"].report)
+
+
+def test_a_page_shows_a_report_where_it_comes_from_and_that_it_is_stale(monkeypatch):
+    monkeypatch.setattr(reports, "is_stale", lambda wanted: False)
+    lines = views.shown("accuracy", "errors-by-rate")
     assert lines[0].count("|") == lines[1].count("|") == 6
-    assert any(line.startswith("| `kalman` u | ") for line in lines)
+    (row,) = (line for line in lines if line.startswith("| `kalman` u | "))
+    errors = [each["rms_mm_s"] for each in KEPT["accuracy"].report["rows"] if each["estimator"] == "kalman"]
+    shown = [float(cell) for cell in row.strip("| ").split(" | ")[1:]]
+    assert sorted(shown) == pytest.approx(sorted(errors), rel=5e-3)
+    assert f"`{KEPT['accuracy'].command}`, version {KEPT['accuracy'].version}" in lines[-2]
+    assert "Stale" not in lines[-2]
+    monkeypatch.setattr(reports, "is_stale", lambda wanted: True)
+    assert "**Stale: its sources have changed since.**" in views.shown("accuracy", "errors-by-rate")[-2]
 
 
-def test_areas_are_shown_with_their_interval():
-    each = {
-        "label": "kalman u", "area_n2_s_per_m2": 30.6e6, "area_low_n2_s_per_m2": 30.1e6, "area_high_n2_s_per_m2": 31e6,
-        "largest_stiffness_n_per_m": 123e3,
-    }  # fmt: skip
-    assert views.areas({"maps": [each]})[2] == "| kalman u | 30600 | 30100 to 31000 | 123 |"
+def test_a_report_that_is_not_known_is_not_shown(monkeypatch):
+    for name, view, said in (
+        ("none", "errors-by-rate", "no such report"),
+        ("accuracy", "none", "the view must be one"),
+    ):
+        with pytest.raises(views.UnknownError, match=said):
+            views.shown(name, view)
+    wrong = replace(KEPT["accuracy"], report={"rows": [{}]})
+    monkeypatch.setattr(reports, "kept", lambda name: wrong)
+    with pytest.raises(views.UnknownError, match=r"^accuracy: \$\.rows"):
+        views.shown("accuracy", "errors-by-rate")

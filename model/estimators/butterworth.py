@@ -96,7 +96,7 @@ class Gains(EstimatorGains):
 
     @classmethod
     def default(cls, axis: AxisRequirements) -> "Gains":
-        """Return the cutoff whose delay is half of the minimax window, sqrt(2) / (2 pi f_c) = sqrt(q / C)."""
+        """Return the cutoff whose delay is sqrt(q / C) = sqrt(2) / (2 pi f_c)."""
         return cls(min(_default_hz(axis), CUTOFF_MAX * axis.sample_hz))
 
 

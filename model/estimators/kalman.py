@@ -16,9 +16,9 @@ Source: Belanger, Dobrovolny, Helmy, Zhang, International Journal of Robotics Re
 
 Noise model. The quantisation error and the acceleration are two stationary signals with exponential correlation: the
 error has RMS q / sqrt(12), and the acceleration, uniform within the axis's C, has RMS C / sqrt(3). The correlation
-times (`noise_time_s`, `acceleration_time_s`) are by default 2 sqrt(q/C), the minimax window: in a shorter time, neither
-does a change of acceleration show in the counts nor does an axis that starts to move reach the next count. Either
-signal is modelled as a white one with the same power below those rates:
+times (`noise_time_s`, `acceleration_time_s`) are by default 2 sqrt(q/C), the minimax window of an error of one count:
+in a shorter time, neither does a change of acceleration show in the counts nor does an axis that starts to move reach
+the next count. Either signal is modelled as a white one with the same power below those rates:
 
     R = rms^2 coth(tau / (2 time))        counts^2: gives the variance of the mean of many samples
     Q = 2 rms^2 (1 - exp(-tau / time))    mean square change of the acceleration in a sample
@@ -111,7 +111,7 @@ class Gains(EstimatorGains):
 
     @classmethod
     def default(cls, axis: AxisRequirements) -> "Gains":
-        """Return the default noise model: uniform acceleration within C, uniform quantisation, the minimax window."""
+        """Return the default noise model: uniform acceleration within C, uniform quantisation, 2 sqrt(q/C)."""
         bound, q = axis.acceleration_max_m_per_s2, axis.count_m
         window = 2 * math.sqrt(q / bound)
         return cls(bound / math.sqrt(3), window, q / math.sqrt(12), window)

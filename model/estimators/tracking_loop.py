@@ -98,7 +98,7 @@ class Gains(EstimatorGains):
 
     @classmethod
     def default(cls, axis: AxisRequirements) -> "Gains":
-        """Return the bandwidth whose delay is half of the minimax window, 2 / w = sqrt(q / C), as of `butterworth`."""
+        """Return the bandwidth whose delay is sqrt(q / C) = 2 / w, as of `butterworth`."""
         wanted = math.sqrt(axis.acceleration_max_m_per_s2 / axis.count_m) / math.pi
         return cls(min(wanted, bandwidth_max_hz(axis)))
 

@@ -20,6 +20,7 @@ from PIL import Image
 
 from ...model.runtime.whole_file import whole_file
 from ..scene.schema import Scene
+from ..studies.rendered_setting import rate_text
 from ..walls.hit import UNDECIDED, Hit
 from ..walls.hit_beside import Beside
 from .style import LABEL_PT, PAGE_IN, THEORY, lay_out, length_text, new_figure, page
@@ -186,7 +187,7 @@ def _wall(scene: Scene) -> str:
 
 
 def _headline(hit: Hit) -> str:
-    return f"Force at {_rate(hit.scene.spec.actuation_hz)}: {_does(hit)}"
+    return f"Force at {rate_text(hit.scene.spec.actuation_hz)}: {_does(hit)}"
 
 
 def _does(hit: Hit) -> str:
@@ -206,13 +207,8 @@ def _loop(scene: Scene) -> str:
     """Return the estimator and the rates of a loop."""
     spec = scene.spec
     late = f", {scene.amplifier.delay_s * 1e3:g} ms late" if scene.delay_samples else ""
-    return (
-        f"{scene.controller.estimator}: velocity at {_rate(spec.sample_hz)}, force at {_rate(spec.actuation_hz)}{late}"
-    )
-
-
-def _rate(rate_hz: float) -> str:
-    return f"{rate_hz / 1e6:g} MHz" if rate_hz >= 1e6 else f"{rate_hz / 1e3:g} kHz"
+    sampled, actuated = rate_text(spec.sample_hz), rate_text(spec.actuation_hz)
+    return f"{scene.controller.estimator}: velocity at {sampled}, force at {actuated}{late}"
 
 
 def _verdict(hit: Hit) -> str:

@@ -1,15 +1,16 @@
 """Pictures of what the rate buys: the largest stable stiffness and the parts that limit it, and beside it the error."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from ..studies.rates import Rates
+from ..studies.rendered_setting import rate_text
 from .labels import label_points, label_right
-from .style import THEORY, ink, lay_out, looks, new_figure, page
+from .style import BAND, THEORY, ink, lay_out, looks, new_figure, page
 
 STYLES = "-", "--", "-.", ":"
 OWN = 0.45
@@ -18,8 +19,18 @@ TOP_KN_PER_M = 1500.0
 LOW_PASS = "butterworth"
 """The plain filter that is compared with the estimator that gains most by the rate."""
 
-Curves = Mapping[str, list[tuple[float, float]]]
-"""The points of curves, (rate in kHz, value), by the label of an estimator and its output."""
+
+class Point(NamedTuple):
+    """A value at a rate (Hz), and the ends of its interval."""
+
+    rate_hz: int
+    value: float
+    low: float
+    high: float
+
+
+Curves = Mapping[str, list[Point]]
+"""The points of curves by the label of an estimator and its output."""
 
 
 @page
@@ -83,43 +94,56 @@ def draw_beside_errors(accuracy: Mapping[str, Any], rates: Mapping[str, Any]) ->
         accuracy: the report of `hardwall accuracy` on one signal.
         rates: the report of `hardwall rates`, with some of the same estimators.
     """
-    errors = _errors(accuracy["rows"])
-    stiffest = {
-        each["label"]: [
-            (rate / 1e3, k / 1e3) for rate, k in zip(each["rates_hz"], each["largest_stiffness_n_per_m"], strict=True)
-        ]
-        for each in rates["methods"]
-    }
+    errors, stiffest = _errors(accuracy["rows"]), _stiffest(rates["methods"])
     figure = new_figure(3.9, _message(errors, stiffest))
     left, right = figure.subplots(1, 2)
     left.set_yscale("log")
     left.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     left.set_title("error of the velocity")
     left.set_ylabel("RMS error (mm/s)")
-    right.set_title("stiffness of the wall")
+    right.set_title("stiffness of the wall; bands: the starts")
     right.set_ylabel("largest stable stiffness (kN/m)")
     for axes, curves in ((left, errors), (right, stiffest)):
         _against_rate(axes, curves)
-    right.set_ylim(0, 1.1 * max(k for points in stiffest.values() for _, k in points))
+    right.set_ylim(0, 1.1 * max(point.high for points in stiffest.values() for point in points))
     for axes, curves in ((left, errors), (right, stiffest)):
-        label_right(axes, [(name, points[-1][1], ink(name.split()[0])) for name, points in curves.items()])
+        label_right(axes, [(name, points[-1].value, ink(name.split()[0])) for name, points in curves.items()])
     return figure
 
 
 def _errors(rows: list[dict[str, Any]]) -> Curves:
     """Return the RMS errors (mm/s) of an accuracy report over the rate."""
-    curves: dict[str, list[tuple[float, float]]] = {}
+    curves: dict[str, list[Point]] = {}
     for row in sorted(rows, key=lambda row: row["sample_hz"]):
         name = row["estimator"] if row["output"] == "u" else f"{row['estimator']} {row['output']}"
-        curves.setdefault(name, []).append((row["sample_hz"] / 1e3, row["rms_mm_s"]))
+        curves.setdefault(name, []).append(Point(row["sample_hz"], *[row["rms_mm_s"]] * 3))
     return curves
 
 
+def _stiffest(methods: list[dict[str, Any]]) -> Curves:
+    """Return the largest stable stiffness (kN/m) over the rate, with the interval of the starts."""
+    return {
+        each["label"]: [
+            Point(rate_hz, k / 1e3, low / 1e3, high / 1e3)
+            for rate_hz, k, (low, high) in zip(
+                each["rates_hz"],
+                each["largest_stiffness_n_per_m"],
+                each["largest_stiffness_interval_n_per_m"],
+                strict=True,
+            )
+        ]
+        for each in methods
+    }
+
+
 def _against_rate(axes: Axes, curves: Curves) -> None:
-    """Draw curves over a logarithmic axis of rates."""
+    """Draw curves, and their intervals as bands, over a logarithmic axis of rates."""
     names = [(name.split()[0], "".join(name.split()[1:]) or "u") for name in curves]
     for points, style in zip(curves.values(), looks(names), strict=True):
-        axes.plot(*zip(*points, strict=True), **style)
+        rates_khz = [point.rate_hz / 1e3 for point in points]
+        axes.plot(rates_khz, [point.value for point in points], **style)
+        ends = [point.low for point in points], [point.high for point in points]
+        axes.fill_between(rates_khz, *ends, color=style["color"], alpha=BAND, lw=0)
     axes.set_xscale("log")
     axes.set_xticks([1, 10, 100, 1000], ["1", "10", "100", "1000"])
     axes.minorticks_off()
@@ -128,10 +152,10 @@ def _against_rate(axes: Axes, curves: Curves) -> None:
 
 def _message(errors: Curves, stiffest: Curves) -> str:
     """Return what the numbers say: whose error changes most with the rate, and where a plain low pass is better."""
-    times = {name: points[-1][1] / points[0][1] for name, points in errors.items()}
+    times = {name: points[-1].value / points[0].value for name, points in errors.items()}
     worst, best = max(times, key=times.__getitem__), min(times, key=times.__getitem__)
-    first, last = (_rate(next(iter(errors.values()))[place][0]) for place in (0, -1))
-    wins = [_where(curves, best, sign) for curves, sign in ((errors, 1), (stiffest, -1))]
+    first, last = (rate_text(errors[worst][place].rate_hz) for place in (0, -1))
+    wins = [_where(curves, best, lower) for curves, lower in ((errors, True), (stiffest, False))]
     return (
         f"From {first} to {last} the error of {worst} grows {times[worst]:.3g} times, and {best} gets "
         f"{1 / times[best]:.3g} times better\n"
@@ -139,17 +163,13 @@ def _message(errors: Curves, stiffest: Curves) -> str:
     )
 
 
-def _where(curves: Curves, other: str, sign: int) -> str:
-    """Return at which rates the low pass has the lesser (sign 1) or the larger (-1) value than another estimator."""
+def _where(curves: Curves, other: str, lower: bool) -> str:
+    """Return at which rates the interval of the low pass is below (`lower`) or above that of another estimator."""
     pairs = zip(curves.get(LOW_PASS, []), curves.get(other, []), strict=True)
-    wins = [(rate, sign * (value - of_other) < 0) for (rate, value), (_, of_other) in pairs]
-    where = [rate for rate, better in wins if better]
+    wins = [(ours.rate_hz, ours.high < its.low if lower else ours.low > its.high) for ours, its in pairs]
+    where = [rate_hz for rate_hz, better in wins if better]
     if len(where) in (0, len(wins)):
         return "at every rate" if where else "at none"
-    if all(better for rate, better in wins if rate <= where[-1]):
-        return f"up to {_rate(where[-1])}"
-    return f"at {', '.join(map(_rate, where))}"
-
-
-def _rate(rate_khz: float) -> str:
-    return f"{rate_khz / 1e3:g} MHz" if rate_khz >= 1e3 else f"{rate_khz:g} kHz"
+    if all(better for rate_hz, better in wins if rate_hz <= where[-1]):
+        return f"up to {rate_text(where[-1])}"
+    return f"at {', '.join(map(rate_text, where))}"

