@@ -1,1 +1,24 @@
-"""Bit-accurate reference of every hardware block: integers in, the same integers as the RTL out."""
+"""Bit-accurate reference of every hardware block: integers in, the same integers as the RTL out.
+
+For studies: `velocity` and `velocity_of_edges` in one call, `VelocityEstimator` with its `Motion` for a record in
+pieces, and `Sampler` for a loop of one's own. They are loaded when they are first used; `__init__.pyi` has their types.
+"""
+
+from importlib import import_module
+from typing import Any
+
+_HOMES = {
+    "Motion": "motion",
+    "RecordWarning": "records",
+    "Sampler": "sampler",
+    "VelocityEstimator": "velocity_estimator",
+    "velocity": "records",
+    "velocity_of_edges": "records",
+}
+__all__ = list(_HOMES)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f".{_HOMES[name]}", __name__), name)

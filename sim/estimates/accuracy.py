@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...model.estimators import registry
+from ...model.record_axis import GLITCH_CLOCKS
 from ...model.runtime.compiled import compiled
 from ...model.spec import AxisSpec
 from ..scene.load import load
@@ -24,7 +25,6 @@ from .motions import velocity
 from .playback import velocities
 from .recording import Recording
 from .replay import check_length, replay
-from .through_pins import GLITCH_CLOCKS
 
 RATES_HZ = (1_000, 10_000_000)
 """The slowest and the fastest rate that is measured."""

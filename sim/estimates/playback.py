@@ -11,6 +11,7 @@ import numpy as np
 
 from ...model.axis.design import change_of, strobe_of
 from ...model.encoder import scale_map
+from ...model.record_axis import DECODER_CLOCKS
 from ...model.runtime.compiled import compiled, inlined
 from ...model.spec import AxisSpec
 from ...model.stamped import Edges
@@ -21,7 +22,6 @@ from ..world.lines import Lines
 from ..world.scale import Scale
 from .motions import Encoded, encoded
 from .signals import Signal
-from .through_pins import DECODER_CLOCKS
 
 CHUNK = 1 << 18
 

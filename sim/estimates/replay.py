@@ -22,14 +22,16 @@ import numpy as np
 from ...model.checks import NUMBERS, shown
 from ...model.encoder.quadrature_speed import max_edge_rate
 from ...model.estimators import registry
+from ...model.motion import least_acceleration
+from ...model.record_axis import GLITCH_CLOCKS
+from ...model.record_time import SECOND
 from ...model.runtime.result import Summary
 from ...model.runtime.whole_file import whole_file
 from ...model.spec import AxisSpec
 from ..loop.backends import BACKENDS, is_exact
 from .recording import Recording
 from .reference import REFERENCE_HZ, SETTLE_S, acceleration_bound, judged_from, zero_phase_velocity
-from .replay_axis import SECOND, axis_spec, least_bound, needs_pins, run
-from .through_pins import GLITCH_CLOCKS
+from .replay_axis import axis_spec, needs_pins, run
 
 CLOCK_MAX_HZ = 100e6
 """The fastest clock of a replay; counts that change too fast for it are a fault of the recording, not a motion."""
@@ -252,7 +254,7 @@ def plan(
     reference = zero_phase_velocity(recording.counts, rate, cutoff)
     bound = given
     if bound is None:
-        bound = max(acceleration_bound(reference, rate), least_bound(counts) * coarsen * rate**2)
+        bound = max(acceleration_bound(reference, rate), least_acceleration(counts) * coarsen * rate**2)
     try:
         spec = axis_spec(counts, coarsen, bound / rate**2, estimator)
     except ValueError as error:

@@ -10,16 +10,12 @@ from collections.abc import Callable
 import numpy as np
 
 from ...model.axis.design import Timing, strobe_of
-from ...model.encoder import quadrature
+from ...model.encoder.level import level
+from ...model.record_axis import DECODER_CLOCKS
 from ...model.runtime.compiled import compiled
 from ...model.stamped import room_for
 from ..loop.controllers import sample, sample_quietly, taken_off
-from ..world.encoder import level
 
-GLITCH_CLOCKS = 0
-"""The glitch filter: edges that are computed have no glitches, and are never too fast for the decoder alone."""
-DECODER_CLOCKS = quadrature.latency(GLITCH_CLOCKS)
-"""The latency of the decoder: an edge this many clocks before a strobe is the last that is counted at it."""
 CHUNK_CLOCKS = 1 << 20
 """The number of clocks between two reports of progress."""
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+from hardwall.model.record_axis import DECODER_CLOCKS
 from hardwall.sim.estimates import edge_limit, signals
 from hardwall.sim.estimates.accuracy import axis_spec, errors_of, measure
-from hardwall.sim.estimates.through_pins import DECODER_CLOCKS
 from stimuli.lengths import LONG
 
 

@@ -21,7 +21,10 @@ from stimuli.specs import spec
 from .pages import command_line
 
 FILE = Path(__file__).with_name("promised.txt")
-PYTHON = (("model.axis", "Axis"), ("model.axis", "step"), ("model.spec", "AxisSpec"), ("model.stamped", "run"))
+PYTHON = (
+    *(("model", name) for name in ("Motion", "Sampler", "VelocityEstimator", "velocity", "velocity_of_edges")),
+    *(("model.axis", "Axis"), ("model.axis", "step"), ("model.spec", "AxisSpec"), ("model.stamped", "run")),
+)
 
 
 def of_python() -> Iterator[str]:

@@ -1,9 +1,11 @@
 """The sources that a test comes from: itself and all of the project that it imports, found without an import of them.
 
-Three parts of the project are no such sources:
+Some parts of the project are no such sources:
 
 - **The hardware.** It is in the Verilog. But what it imports is: a test may ask a component for its design.
 - **What runs the simulator**, `RUNNER`. It imports most of the project, of which nothing comes into a test.
+- **What compiles kernels and keeps files**, `RUNTIME`. With it or without, a kernel computes the same.
+- **Packages.** Of an `__init__.py` only what it imports counts: it passes names on.
 - **Estimators that the test does not name.** Every axis's specification imports all of them by their registry. In its
   place come those whose names are texts in the test or in what it imports of the tests, and the specification's
   default. A test that imports the registry itself has them all.
@@ -20,7 +22,7 @@ from hardwall.model.runtime.provenance import imported
 from .blocks import TESTS
 
 TREE = TESTS.parent
-HARDWARE, RUNNER = Path("hdl"), Path("sim/rtl")
+HARDWARE, RUNNER, RUNTIME = Path("hdl"), Path("sim/rtl"), Path("model/runtime")
 REGISTRIES = tuple(Path(room, "estimators/registry.py") for room in ("model", "hdl"))
 CHOICE = Path("model/axis/designed.py")
 """Where all estimators are, and where an axis chooses one, with a default."""
@@ -80,7 +82,7 @@ def sources_of(test: Path, tree: Path = TREE) -> list[Path]:
             names |= {*_estimators(content)}
         found = (each for name in names for each in _files(tree, name, test.parent))
         waiting += [each for each in found if is_test or each not in REGISTRIES]
-    return sorted(file for file in seen if not file.is_relative_to(HARDWARE))
+    return sorted(file for file in seen if file.name != "__init__.py" and not {HARDWARE, RUNTIME} & {*file.parents})
 
 
 def code_of(source: bytes) -> str:

@@ -1,0 +1,200 @@
+"""An axis a sample at a time: the position of a handle in, the force out, for loops of one's own.
+
+Between two samples the position moves evenly. Its edges go to the pins of the hardware's decoder at their clocks: so
+estimators that time edges work, and the decoder's latency and its faults are those of the hardware. In a sample of D
+clocks from t0 on, from x0 to x1, the edge at the border b comes at
+
+    t = t0 + 1 + floor(D (b - x0) / (x1 - x0)),      one edge a clock, the last not after t0 + D
+
+What passes more edges than a sample has clocks is beyond any decoder: both pins then change at once, which is the flag
+`encoder_illegal`, and no force from there on.
+"""
+
+import math
+from functools import cache
+from typing import Any
+
+import numba
+from numba.experimental import jitclass
+
+from .axis.axis import Axis
+from .axis.design import strobe_of
+from .checks import check_number, shown
+from .encoder.level import level
+from .encoder.quadrature import Inputs, advance
+from .runtime.compiled import compiled, inlined
+from .spec import AxisSpec
+from .stamped import State, controller, sample_quietly
+
+REACH = 2.0**52
+"""The largest position in counts, either way: of a larger one, the cell is not known."""
+
+
+@compiled
+def cell_of(position, count_m):
+    """Return the number of the cell between two edges in which a position lies: its count."""
+    return math.floor(position / count_m)
+
+
+@inlined
+def turned(controller, state, clock, pins):
+    """Return the state with the decoder advanced to `clock`, from which the pins have another level; no sample."""
+    inputs = Inputs(state.level & 1, state.level >> 1, 0, controller.glitch_clocks, controller.invert)
+    decoder = advance(controller.decoder, state.decoder, inputs, clock - state.clock)
+    return State(state.drive, state.velocity, state.force, state.flags, decoder, state.axis, clock, pins)
+
+
+@inlined
+def pass_edges(controller, state, count_m, places, start, clocks):
+    """Return the state behind the edges of a motion.
+
+    Args:
+        controller, state: of `stamped`.
+        count_m: size of a count, m.
+        places: the positions before and behind it, m.
+        start, clocks: the edges come at clocks start + 1 to start + clocks.
+    """
+    place, position = places
+    count, last = cell_of(place, count_m), cell_of(position, count_m)
+    total, direction = abs(last - count), 1 if last > count else -1
+    if total > clocks:
+        return turned(controller, state, start + 1, state.level ^ 3)
+    before = start
+    for i in range(total):
+        border = max(count, count + direction) * count_m
+        share = int(clocks * (border - place) / (position - place))
+        before = max(before + 1, min(start + 1 + share, start + clocks - (total - 1 - i)))
+        count += direction
+        state = turned(controller, state, before, level(count))
+    return state
+
+
+@compiled
+def sample(controller, state, timing, count_m, places, k):
+    """Return the state after sample k, which ends the motion between two positions, m."""
+    clocks, strobe = timing.clocks_per_sample, strobe_of(timing, k)
+    state = pass_edges(controller, state, count_m, places, strobe - clocks, clocks)
+    return sample_quietly(controller, state, strobe)
+
+
+@numba.njit(error_model="numpy", nogil=True)
+def _take(cell, position):
+    """Take the next sample at a position, m; return the drive, force LSB, or NaN for a position without a cell."""
+    if not abs(position) <= REACH * cell.count_m:
+        return math.nan
+    places = cell.place, position
+    cell.state = sample(cell.controller, cell.state, cell.timing, cell.count_m, places, cell.samples)
+    cell.place = position
+    cell.samples += 1
+    return float(cell.state.drive)
+
+
+@cache
+def _cell(controller: Any, state: Any, timing: Any) -> type:
+    """Return the class of what a sampler keeps between samples, for these types of Numba."""
+    members = (
+        ("controller", controller),
+        ("state", state),
+        ("timing", timing),
+        ("count_m", numba.float64),
+        ("place", numba.float64),
+        ("samples", numba.int64),
+    )
+
+    class Cell:
+        def __init__(self, controller, state, timing, count_m, place):
+            self.controller, self.state, self.timing = controller, state, timing
+            self.count_m, self.place, self.samples = count_m, place, 0
+
+    return jitclass(members)(Cell)
+
+
+class Sampler:
+    """An axis that takes a position and returns its force, sample by sample.
+
+        sampler = Sampler(spec, wall_stiffness=20e3, wall_damping=10.0)
+        while True:
+            force_n = sampler(position_m)       # every 1 / spec.sample_hz seconds
+
+    The first position is that of the axis at reset: it gives the count, and no velocity. The count is the position over
+    the size of a count, rounded down. An edge within the decoder's latency before a sample counts at the next one.
+
+    Args:
+        spec: the axis.
+        floating: true for the same algorithms in float64, with gains unrounded.
+        si: run-time words in SI units by name, e.g. `wall_stiffness=20e3` (N/m); see `axis.design.Design.words`.
+
+    Raises:
+        TypeError: if `spec` is no AxisSpec, or a value is not a number.
+        ValueError: if a name is unknown or a value is out of range.
+    """
+
+    def __init__(self, spec: AxisSpec, floating: bool = False, **si: float):
+        if not isinstance(spec, AxisSpec):
+            raise TypeError(f"spec must be an AxisSpec, not {shown(spec)}")
+        self.spec, self._floating, self._si = spec, floating, dict(si)
+        self._axis = Axis(spec, floating, **si)
+        self._kept: Any = None
+
+    def reset(self) -> None:
+        """Begin anew: the next position is the first. Run-time words stay."""
+        self._kept = None
+
+    def set(self, **si: float) -> None:
+        """Change run-time words from the next sample on, in SI units by name, as a host does.
+
+        Raises:
+            TypeError: if a value is not a number.
+            ValueError: if a name is unknown or a value is out of range.
+        """
+        self._axis = Axis(self.spec, self._floating, **self._si | si)
+        self._si |= si
+        if self._kept is not None:
+            self._kept.controller = controller(self._axis, 0)[0]
+
+    def __call__(self, position_m: float) -> float:
+        """Take a sample at a position, m; return the force on the handle behind the output stage, N.
+
+        Raises:
+            ValueError: if the position is not finite, or the first one is beyond the count.
+        """
+        if self._kept is None:
+            self._start(position_m)
+        drive = _take(self._kept, float(position_m))
+        if math.isnan(drive):
+            raise ValueError(f"position_m must be finite, and within 2**52 counts, not {shown(position_m)}")
+        return drive * self.spec.force_resolution_n
+
+    def _start(self, position_m: float) -> None:
+        check_number("position_m", position_m)
+        half = 1 << (self.spec.count_width - 1)
+        reach_m = half * self.spec.count_m
+        if not -reach_m <= position_m < reach_m:
+            raise ValueError(f"position_m must begin within -{reach_m:g} to {reach_m:g} m, not {shown(position_m)}")
+        count = cell_of(float(position_m), self.spec.count_m)
+        words, state = controller(self._axis, int(level(count)))
+        state = state._replace(decoder=state.decoder._replace(count=count))
+        timing = self._axis.design.timing
+        kind = _cell(*map(numba.typeof, (words, state, timing)))
+        self._kept = kind(words, state, timing, float(self.spec.count_m), float(position_m))
+
+    @property
+    def state(self) -> State | None:
+        """The states of decoder and axis after the last sample; None before the first."""
+        return None if self._kept is None else self._kept.state
+
+    @property
+    def velocity_m_per_s(self) -> float:
+        """The velocity of the last sample, m/s; 0 before the first."""
+        lsb = 1.0 if self._floating else self._axis.design.estimator.velocity.lsb
+        return 0.0 if self._kept is None else self._kept.state.velocity * lsb * self.spec.velocity_unit_m_per_s
+
+    @property
+    def count(self) -> int:
+        """The count of the last sample; 0 before the first."""
+        return 0 if self._kept is None else self._kept.state.decoder.count
+
+    @property
+    def flags(self) -> list[str]:
+        """The names of the sticky flags that are up."""
+        return [] if self._kept is None else self._axis.design.flag_names(self._kept.state.flags)

@@ -1,0 +1,202 @@
+"""A velocity estimator of the hardware for records of counts, whole or in pieces."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import checks
+from .encoder.quadrature import seen_count
+from .estimators import registry
+from .estimators.estimate import EstimatorGains, estimate
+from .motion import Motion
+from .record_axis import axis_of
+from .record_time import RecordTime
+from .runtime.compiled import compiled
+
+BACKENDS = "fixed", "float"
+"""The hardware's words, and the same algorithm in float64 with unrounded gains."""
+
+
+@compiled
+def run(params: tuple, state: tuple, counts: np.ndarray, velocity: np.ndarray) -> tuple[tuple, int]:
+    """Fill `velocity` with the words of a record of counts; return the state and the flags that were raised."""
+    flags = 0
+    for k in range(len(counts)):
+        state, velocity[k], raised = estimate(params, state, seen_count(counts[k]), 0)
+        flags |= raised
+    return state, flags
+
+
+def chosen(estimator: str, output: str | None, backend: str) -> str:
+    """Return the name of an estimator's output, its first for None.
+
+    Raises:
+        ValueError: if a name is unknown.
+    """
+    outputs = registry.design_of(estimator).outputs
+    if backend not in BACKENDS:
+        raise checks.FieldError("backend", f"must be one of {', '.join(BACKENDS)}, not {checks.shown(backend)}")
+    if output is not None and output not in outputs:
+        raise checks.FieldError("output", f"of {estimator} must be one of {', '.join(outputs)}, not {output!r}")
+    return outputs[0] if output is None else output
+
+
+class VelocityEstimator:
+    """An estimator with its state: counts in, velocities out, a record in as many pieces as one likes.
+
+        estimator = VelocityEstimator(10e3, "kalman", Motion(count=1e-6, acceleration_max=12, speed_max=2, travel=0.15))
+        first, second = estimator(counts[:500]), estimator(counts[500:])
+
+    A copy (`copy.deepcopy`) keeps the state, to go on from it twice.
+
+    Args:
+        sample_hz: sample rate, Hz; it need not be whole.
+        estimator: name of an estimator that needs only counts: see `estimators.registry`.
+        motion: the bounds of the motion; formats and default gains follow from it.
+        output: the estimator's output; None for its first.
+        backend: `fixed` for the hardware's words, `float` for the same algorithm in float64 with unrounded gains.
+        gains: the estimator's `Gains` in seconds and the motion's unit; None for its default ones.
+        settings: run-time words by name, in seconds and the motion's unit, as of `set`.
+
+    Attributes:
+        spec: the axis that the estimator is of; in it, a second is `record_time.SECOND` samples.
+        words: the run-time words that may be set, by name.
+
+    Raises:
+        TypeError: if an argument is of the wrong type.
+        ValueError: if a name is unknown, a value is out of range, or the estimator needs the edges
+            (`velocity_of_edges` takes them).
+    """
+
+    def __init__(
+        self,
+        sample_hz: float,
+        estimator: str,
+        motion: Motion,
+        output: str | None = None,
+        backend: str = "fixed",
+        gains: EstimatorGains | None = None,
+        **settings: ArrayLike,
+    ):
+        output = chosen(estimator, output, backend)
+        if registry.design_of(estimator).uses_stamps():
+            raise checks.FieldError(
+                "estimator", f"must be one that needs only counts, not {estimator!r}: velocity_of_edges takes the edges"
+            )
+        self._time, self._floating, self._output = RecordTime(sample_hz), backend == "float", output
+        self.spec = axis_of(motion, self._time, estimator, gains)
+        self._design = self.spec.design.estimator
+        self.words = {word.name: word for word in self._design.words if word.name != self._design.output_word()}
+        lsb = 1.0 if self._floating else self._design.velocity.lsb
+        self._unit = lsb * motion.count * sample_hz
+        self._settings: dict[str, np.ndarray] = {}
+        self.reset()
+        self.set(**settings)
+
+    def reset(self) -> None:
+        """Forget every count: the next one is the first."""
+        self._states: list[tuple] = []
+        self._last: np.ndarray | None = None
+        self._origin: np.ndarray | None = None
+        self._flags = 0
+
+    def set(self, **settings: ArrayLike) -> None:
+        """Change run-time words from the next count on, as a host does while the hardware runs.
+
+        Args:
+            settings: values by the name of their word, in seconds and the motion's unit. An array is broadcast against
+                the lanes of the counts, the shape without the axis of time: a value a lane.
+
+        Raises:
+            TypeError: if a value is not a number.
+            ValueError: if a name is no word, or a value does not fit its word; the message says what is accepted.
+        """
+        for name, values in settings.items():
+            for value in np.asarray(values).ravel().tolist():
+                self._time.encode(self.words, {name: value})
+        self._settings |= {name: np.asarray(values) for name, values in settings.items()}
+
+    @property
+    def flags(self) -> list[str]:
+        """The names of the flags that were raised in any lane since the start: words that saturated."""
+        return [name for bit, name in enumerate(self._design.flags) if self._flags >> bit & 1]
+
+    def __call__(self, counts: ArrayLike, axis: int = -1) -> np.ndarray:
+        """Return the velocities at further counts, in the motion's unit per second, as float64.
+
+        Args:
+            counts: integers; along `axis` they follow one another, and the other axes are independent lanes. A count
+                may have any origin. From one to the next it changes by less than half of the count's range.
+            axis: the axis of time.
+
+        Returns:
+            An array of the shape of the counts; where settings are arrays, of the shape to which both broadcast.
+
+        Raises:
+            TypeError: if the counts are not integers.
+            ValueError: if the counts have no axis of time, or other lanes than before, or jump.
+        """
+        counts = checks.integers("counts", counts)
+        if counts.ndim == 0 or not -counts.ndim <= axis < counts.ndim:
+            raise ValueError(f"counts of {counts.ndim} dimensions must have the axis {axis!r}")
+        counts = np.moveaxis(counts, axis, -1)
+        shape = self._lanes(counts.shape[:-1])
+        lanes = np.broadcast_to(counts, (*shape, counts.shape[-1]))
+        made = np.zeros(lanes.shape, np.float64)
+        if lanes.size:
+            words = self._in_range(lanes.reshape(-1, lanes.shape[-1]))
+            self._start(len(words))
+            for lane, (row, params) in enumerate(zip(words, self._params(shape), strict=True)):
+                velocity = np.zeros(len(row), np.float64 if self._floating else np.int64)
+                self._states[lane], raised = run(params, self._states[lane], row, velocity)
+                self._flags |= int(raised)
+                made[np.unravel_index(lane, shape) if shape else ()] = velocity * self._unit
+        return np.moveaxis(made, -1, axis)
+
+    def _lanes(self, shape: tuple[int, ...]) -> tuple[int, ...]:
+        """Return the shape of the lanes of counts and settings together."""
+        shapes = {name: values.shape for name, values in self._settings.items() if values.shape}
+        try:
+            return np.broadcast_shapes(shape, *shapes.values())
+        except ValueError:
+            said = ", ".join(f"{name} of shape {each}" for name, each in shapes.items())
+            raise ValueError(f"settings must broadcast against lanes of shape {shape}, not {said}") from None
+
+    def _start(self, lanes: int) -> None:
+        """Give every lane its first state, unless it has one."""
+        if not self._states:
+            self._states = [self._design.start(self._floating) for _ in range(lanes)]
+
+    def _in_range(self, counts: np.ndarray) -> np.ndarray:
+        """Return counts of shape (lanes, samples) as words of the count's width, around the first count of a lane."""
+        if self._last is None or self._origin is None:
+            self._last = self._origin = counts[:, 0]
+        if len(counts) != len(self._last):
+            raise ValueError(f"counts must have {len(self._last)} lanes as before, not {len(counts)}")
+        half = 1 << (self.spec.count_width - 1)
+        steps = np.diff(counts, axis=-1, prepend=self._last[:, None])
+        if (wrong := np.argwhere((steps >= half) | (steps < -half))).size:
+            lane, sample = wrong[0]
+            raise ValueError(
+                f"counts must change by less than {half} from sample to sample, half of the range that follows from "
+                f"the travel, not by {steps[lane, sample]} at sample {sample}{f' of lane {lane}' if lane else ''}"
+            )
+        self._last = counts[:, -1]
+        return ((counts - self._origin[:, None] + half) & (2 * half - 1)) - half
+
+    def _params(self, shape: Sequence[int]) -> list[tuple]:
+        """Return the kernel's parameters of every lane."""
+        lanes = int(np.prod(shape, dtype=int))
+        columns = {name: np.broadcast_to(each, shape).ravel().tolist() for name, each in self._settings.items()}
+        if not any(each.shape for each in self._settings.values()):
+            return [self._parameters({name: values[0] for name, values in columns.items()})] * lanes
+        return [self._parameters({name: values[lane] for name, values in columns.items()}) for lane in range(lanes)]
+
+    def _parameters(self, settings: dict[str, Any]) -> tuple:
+        encoded, scaled = self._time.encode(self.words, settings)
+        if self._floating:
+            return self._design.float_params(self.spec.design.gains, self._output, scaled)
+        words = {word.name: word.reset for word in self._design.words} | self._design.choose(self._output) | encoded
+        return self._design.params(words)

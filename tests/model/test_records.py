@@ -1,0 +1,167 @@
+"""A velocity in one call: as a plain difference must be, as the replay says, at any rate; what it says and refuses."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from hardwall.model import Motion, RecordWarning, VelocityEstimator, velocity, velocity_of_edges
+from hardwall.model.estimators.registry import ESTIMATORS
+from hardwall.sim.estimates.replay import replay
+from hardwall.testing import rng
+from stimuli.lengths import LONG
+from stimuli.replays import recording, swing
+
+STAMPED = [name for name, design in ESTIMATORS.items() if design.uses_stamps()]
+BOUNDS = {"acceleration_max": 50.0, "speed_max": 1.0, "travel": 1.0}
+
+
+@pytest.fixture(autouse=True)
+def _no_warning():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        yield
+
+
+def walk(edges: int = 3000) -> tuple[np.ndarray, np.ndarray]:
+    """Return times (s) and counts of edges at random, every tenth in a grid of milliseconds, with turns."""
+    random = rng()
+    times = np.cumsum(random.integers(20, 3000, edges)) * 1e-6
+    return times, np.cumsum(np.where(random.random(edges) < 0.3, -1, 1))
+
+
+@pytest.mark.parametrize("rate", [10e3, 12.5, 0.3, 333.3333, 44.1e3])
+def test_fdm_is_the_plain_difference_at_any_rate(rate):
+    counts = np.cumsum(rng().integers(-40, 41, 500))
+    made = velocity(counts, rate, "fdm", count=1e-3, acceleration_max=1.0, speed_max=0.1 * rate, travel=20.0)
+    assert made[0] == 0
+    assert made[1:] == pytest.approx(np.diff(counts) * 1e-3 * rate, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    "estimator", ["levant", "kalman", "butterworth"] if not LONG else sorted(set(ESTIMATORS) - set(STAMPED))
+)
+def test_it_is_the_replays_velocity(estimator):
+    recorded = swing(1500)
+    rate = recorded.rate_hz
+    seen = replay(recorded, estimator, acceleration_max_counts_per_s2=1e6)
+    same = {"speed_max": seen.spec.speed_max_m_per_s / 1024 * rate, "travel": seen.spec.travel_m}
+    made = velocity(recorded.counts, rate, estimator, acceleration_max=1e6, **same)
+    assert made == pytest.approx(seen.velocity_counts_per_s, rel=1e-12, abs=1e-12)
+
+
+def test_bounds_that_are_not_given_are_said():
+    counts = np.floor(1000 * np.sin(np.arange(3000) / 100)).astype(np.int64)
+    with pytest.warns(
+        RecordWarning, match=r"acceleration_max=[\d.e+-]+, speed_max=[\d.]+, travel=2048: from the record"
+    ) as said:
+        made = velocity(counts, 1e3)
+    assert len(said) == 1
+    assert said[0].filename == __file__
+    motion, _ = Motion.of(counts[None], 1e3)
+    assert made.tolist() == VelocityEstimator(1e3, "kalman", motion)(counts).tolist()
+    true = 1e4 * np.cos(np.arange(3000) / 100)
+    plain = np.diff(counts, prepend=0) * 1e3
+    assert np.std((made - true)[500:]) < np.std((plain - true)[500:]) / 2
+
+
+def test_a_word_that_saturated_is_said():
+    with pytest.warns(RecordWarning, match="velocity_saturated: larger bounds"):
+        velocity(np.arange(100) * 4, 1e3, "fdm", acceleration_max=50.0, speed_max=1e3, travel=1e3)
+
+
+def test_lanes_and_the_axis_of_time():
+    counts = np.cumsum(rng().integers(-5, 6, (4, 3, 200)), axis=-1)
+    bounds = {"acceleration_max": 1e3, "speed_max": 40.0, "travel": 1.0, "count": 1e-3}
+    made = velocity(counts, 1e3, "levant", **bounds)
+    assert made.shape == counts.shape
+    turned = velocity(np.moveaxis(counts, -1, 0), 1e3, "levant", axis=0, **bounds)
+    assert np.moveaxis(turned, 0, -1).tolist() == made.tolist()
+    assert made[2, 1].tolist() == velocity(counts[2, 1], 1e3, "levant", **bounds).tolist()
+
+
+@pytest.mark.parametrize("rate", [1000.0, 777.7])
+def test_fdm_of_edges_is_the_difference_of_the_counts_at_the_samples(rate):
+    """An edge at the very time of a sample counts for it, and one behind it does not."""
+    times, counts = walk()
+    made = velocity_of_edges(times, counts, rate, "fdm", speed_max=100e3, acceleration_max=1e6, travel=1e4)
+    at = times[0] + np.arange(len(made) + 1) / rate
+    # A clock of 100 MHz or more rounds times up by 10 ns: that is less than these times are apart from the samples.
+    assert np.abs(times[:, None] - at)[np.abs(times[:, None] - at) > 1e-12].min() > 1e-8 or rate == 1000.0
+    expected = np.diff(counts[np.searchsorted(times, at + 1e-12, side="right") - 1]) * rate
+    assert made == pytest.approx(expected, rel=1e-12)
+    assert len(made) == int((times[-1] - times[0]) * rate)
+
+
+@pytest.mark.parametrize("backend", ["fixed", "float"])
+@pytest.mark.parametrize("estimator", STAMPED if LONG else ["period", "edge-kalman"])
+def test_a_steady_turn_is_known_from_its_edges_at_any_rate(estimator, backend):
+    """37.5 counts a second sampled at 10 Hz, and a thousandth and a million times of that."""
+    for scale in (1e-3, 1.0, 1e6):
+        times = np.arange(800) / 37.5 / scale
+        made = velocity_of_edges(
+            times, np.arange(800), 10 * scale, estimator, count=0.5, backend=backend, clock_hz=1e5 * scale,
+            acceleration_max=10 * scale**2, speed_max=40 * scale, travel=400.0,
+        )  # fmt: skip
+        assert made[-100:] == pytest.approx(37.5 / 2 * scale, rel=2e-3)
+
+
+def test_edges_are_those_that_a_replay_makes_of_counts():
+    """Counts that change by one in the middle of a sample are edges whose times are known."""
+    counts = np.cumsum(np.tile([1, 0, 0, 1, 0, 1, 1, 0, -1, 0], 100))
+    recorded = recording(counts, 1000.0)
+    seen = replay(recorded, "period", acceleration_max_counts_per_s2=1e5)
+    moved = np.flatnonzero(np.diff(counts)) + 1
+    times, behind = np.r_[0.0, (moved - 0.5) / 1000], np.r_[counts[0], counts[moved]]
+    made = velocity_of_edges(
+        times, behind, 1000.0, "period", acceleration_max=1e5, travel=seen.spec.travel_m,
+        speed_max=seen.spec.speed_max_m_per_s / 1024 * 1000, clock_hz=seen.clock_hz,
+    )  # fmt: skip
+    assert np.abs(made).max() > 100
+    # Each of two edges, a sample apart or more, may be a clock earlier or later.
+    assert made == pytest.approx(seen.velocity_counts_per_s[1 : len(made) + 1], rel=2 / seen.spec.clocks_per_sample)
+
+
+def test_what_velocity_refuses():
+    with pytest.raises(ValueError, match=r"two samples or more along axis -1, not the shape \(1,\)"):
+        velocity([1], 1e3)
+    with pytest.raises(ValueError, match=r"two samples or more along axis 2, not the shape \(4, 5\)"):
+        velocity(np.zeros((4, 5), np.int64), 1e3, axis=2)
+    with pytest.raises(TypeError, match="counts must be integers, not float64"):
+        velocity([1.5, 2.0], 1e3)
+    with pytest.raises(ValueError, match="sample_hz must be 1e-06 to"):
+        velocity([1, 2], 0.0)
+    with pytest.raises(TypeError, match="sample_hz must be a number, not None"):
+        velocity([1, 2], None)
+    with pytest.raises(ValueError, match="levant_lamda is no setting; accepted are levant_lambda, levant_alpha"):
+        velocity([1, 2], 1e3, "levant", levant_lamda=1.0, **BOUNDS)
+    with pytest.raises(ValueError, match="kalman_position is no setting; accepted are none"):
+        velocity([1, 2], 1e3, "fdm", kalman_position=1.0, **BOUNDS)
+    with pytest.raises(ValueError, match="velocity_of_edges takes the edges"):
+        velocity([1, 2], 1e3, "period", **BOUNDS)
+    with pytest.raises(ValueError, match="estimator must be one of"):
+        velocity([1, 2], 1e3, "euler", **BOUNDS)
+
+
+def test_what_velocity_of_edges_refuses():
+    def refused(times, counts, rate=10.0, **more):
+        velocity_of_edges(times, counts, rate, "period", **BOUNDS, **more)
+
+    with pytest.raises(ValueError, match=r"must have one shape \(edges,\) of 2 or more, not \(3,\) and \(2,\)"):
+        refused([0.0, 1.0, 2.0], [0, 1])
+    with pytest.raises(ValueError, match="times_s must increase, not from 1 to 1 at element 2"):
+        refused([0.0, 1.0, 1.0], [0, 1, 2])
+    with pytest.raises(ValueError, match="times_s must be finite, not nan at element 1"):
+        refused([0.0, np.nan, 1.0], [0, 1, 2])
+    with pytest.raises(TypeError, match="times_s must be numbers, not <U1"):
+        refused(["0", "1"], [0, 1])
+    with pytest.raises(ValueError, match="counts must change by 1 at an edge, not by 2 at element 2"):
+        refused([0.0, 1.0, 2.0], [0, 1, 3])
+    with pytest.raises(ValueError, match=r"times_s must last a sample of 0.1 s or more, not 0.05 s"):
+        refused([0.0, 0.05], [0, 1])
+    with pytest.raises(ValueError, match=r"must be a clock of .* s apart or more, not 1e-09 s at element 2; clock_hz"):
+        refused([0.0, 0.123456, 0.123456 + 1e-9], [0, 1, 2], clock_hz=1e6)
+    with pytest.raises(ValueError, match=r"period has no words for this motion \(with 1024 samples a second: "):
+        refused([0.0, 1.0, 1.0 + 1e-9], [0, 1, 2])
+    with pytest.raises(TypeError, match="clock_hz must be a number, not 'x'"):
+        refused([0.0, 1.0], [0, 1], clock_hz="x")

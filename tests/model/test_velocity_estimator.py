@@ -1,0 +1,173 @@
+"""An estimator for records in pieces: the axis's own velocities, whole, in pieces, in lanes, with words that change."""
+
+import copy
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from hardwall.model.axis.axis import Axis
+from hardwall.model.encoder.quadrature import seen_count
+from hardwall.model.estimators import levant
+from hardwall.model.estimators.estimate import estimate
+from hardwall.model.estimators.registry import ESTIMATORS
+from hardwall.model.motion import Motion
+from hardwall.model.spec import AxisSpec
+from hardwall.model.velocity_estimator import VelocityEstimator
+from hardwall.testing import rng
+from stimuli.lengths import LONG
+from stimuli.specs import PAPER
+
+OF_COUNTS = [name for name, design in ESTIMATORS.items() if not design.uses_stamps()]
+SOME = OF_COUNTS if LONG else ["levant", "kalman", "window"]
+MOTION = Motion(count=1e-6, acceleration_max=12.0, speed_max=2.0, travel=0.15)
+RATE = PAPER["sample_hz"]
+
+
+def swing(samples: int = 3000) -> np.ndarray:
+    """Return counts of a sine, with jitter of a count."""
+    noise = rng().integers(0, 2, samples)
+    return np.floor(20e-3 * np.sin(np.arange(samples) / 400) / 1e-6).astype(np.int64) + noise
+
+
+def in_true_seconds(taken: VelocityEstimator) -> AxisSpec:
+    """Return the axis of a motion with a true second, and as many clocks a sample as the estimator's."""
+    return AxisSpec(
+        **{**PAPER, "clock_hz": taken.spec.clocks_per_sample * RATE, "glitch_clocks": 0}, estimator=taken.spec.estimator
+    )
+
+
+@pytest.mark.parametrize("backend", ["fixed", "float"])
+@pytest.mark.parametrize("estimator", SOME)
+def test_velocities_are_those_of_the_axis(estimator, backend):
+    taken = VelocityEstimator(RATE, estimator, MOTION, backend=backend)
+    counts = swing()
+    record = Axis(in_true_seconds(taken), backend == "float").run(counts)
+    made = taken(counts)
+    if backend == "fixed":
+        assert made.tolist() == record.velocity_m_per_s.tolist()
+    else:
+        assert made == pytest.approx(record.velocity_m_per_s, rel=1e-9, abs=1e-9)
+    assert np.abs(made).max() > 0.1
+    assert taken.flags == []
+
+
+@pytest.mark.parametrize("estimator", SOME)
+def test_pieces_are_the_whole(estimator):
+    counts, cuts = swing(), [0, 1, 2, 700, 701, 2500, 3000]
+    whole = VelocityEstimator(RATE, estimator, MOTION)(counts)
+    taken = VelocityEstimator(RATE, estimator, MOTION)
+    pieces = [taken(counts[first:last]) for first, last in pairwise(cuts)]
+    assert np.concatenate(pieces).tolist() == whole.tolist()
+
+
+def test_a_copy_goes_on_from_the_same_state():
+    counts = swing()
+    taken = VelocityEstimator(RATE, "window", MOTION)
+    taken(counts[:1000])
+    other = copy.deepcopy(taken)
+    first = taken(counts[1000:])
+    assert other(counts[1000:]).tolist() == first.tolist()
+    taken.reset()
+    assert taken(counts).tolist() == VelocityEstimator(RATE, "window", MOTION)(counts).tolist()
+
+
+def test_words_change_between_pieces_as_on_the_axis():
+    counts = swing()
+    taken = VelocityEstimator(RATE, "levant", MOTION, output="u1")
+    taken(counts[:1500])
+    taken.set(levant_lambda=10.0, levant_alpha=40.0)
+    made = taken(counts[1500:])
+    spec = in_true_seconds(taken)
+    design, state, expected = spec.design.estimator, spec.design.estimator.start(), []
+    changed = {"levant_lambda": 10.0, "levant_alpha": 40.0}
+    before, after = (design.params(spec.design.encode(levant_output=1, **more)) for more in ({}, changed))
+    for k, count in enumerate(counts.tolist()):
+        state, velocity, _ = estimate(before if k < 1500 else after, state, seen_count(count), 0)
+        expected.append(velocity * design.velocity.lsb * spec.velocity_unit_m_per_s)
+    assert made.tolist() == expected[1500:]
+
+
+def test_lanes_are_independent_along_any_axis():
+    lanes = np.stack([swing(), -swing(), 2 * swing()]).reshape(3, 1, -1)
+    apart = [VelocityEstimator(RATE, "kalman", MOTION)(lane[0]) for lane in lanes]
+    for axis in (-1, 0, 1, 2):
+        counts = np.moveaxis(lanes, -1, axis)
+        made = VelocityEstimator(RATE, "kalman", MOTION)(counts, axis=axis)
+        assert made.shape == counts.shape
+        assert np.moveaxis(made, axis, -1)[:, 0].tolist() == [each.tolist() for each in apart]
+
+
+def test_arrays_of_words_are_broadcast_against_the_lanes():
+    counts = np.stack([swing(), -swing()])
+    lambdas = np.array([[2.0], [5.0], [10.0]])
+    made = VelocityEstimator(RATE, "levant", MOTION, levant_lambda=lambdas, levant_alpha=[20.0, 40.0])(counts)
+    assert made.shape == (3, 2, counts.shape[-1])
+    for i, of_lambda in enumerate(lambdas.ravel()):
+        for j, alpha in enumerate((20.0, 40.0)):
+            alone = VelocityEstimator(RATE, "levant", MOTION, levant_lambda=of_lambda, levant_alpha=alpha)
+            assert made[i, j].tolist() == alone(counts[j]).tolist()
+
+
+def test_gains_in_true_seconds_are_those_of_the_axis():
+    gains = levant.Gains(4.0, 30.0)
+    taken = VelocityEstimator(RATE, "levant", MOTION, gains=gains)
+    axis = Axis(replace(in_true_seconds(taken), gains=gains))
+    assert taken(swing()).tolist() == axis.run(swing()).velocity_m_per_s.tolist()
+
+
+def test_a_count_beyond_its_width_wraps_without_a_trace():
+    counts = 40 * np.arange(-20_000, 20_000)
+    taken = VelocityEstimator(RATE, "fdm", Motion(count=1.0, acceleration_max=1.0, speed_max=40 * RATE, travel=500.0))
+    assert taken(counts)[1:].tolist() == [40.0 * RATE] * 39_999
+    assert taken.spec.count_width < 20
+
+
+def test_a_velocity_beyond_the_bound_saturates_with_a_flag():
+    taken = VelocityEstimator(RATE, "fdm", replace(MOTION, speed_max=0.05))
+    made = taken(np.arange(100) * 1000)
+    assert made.max() < 1000 * 1e-6 * RATE
+    assert taken.flags == ["velocity_saturated"]
+
+
+@pytest.mark.parametrize("estimator", [name for name in ESTIMATORS if name not in OF_COUNTS])
+def test_estimators_by_edges_are_refused(estimator):
+    with pytest.raises(ValueError, match=f"only counts, not '{estimator}': velocity_of_edges takes the edges"):
+        VelocityEstimator(RATE, estimator, MOTION)
+
+
+def test_what_is_refused():
+    taken = VelocityEstimator(RATE, "levant", MOTION)
+    with pytest.raises(TypeError, match="counts must be integers, not float64"):
+        taken(swing() * 1.0)
+    with pytest.raises(ValueError, match="counts of 0 dimensions must have the axis -1"):
+        taken(3)
+    with pytest.raises(ValueError, match="counts of 1 dimensions must have the axis 1"):
+        taken(swing(), axis=1)
+    taken(swing(10))
+    with pytest.raises(ValueError, match="counts must have 1 lanes as before, not 2"):
+        taken(np.zeros((2, 5), np.int64))
+    with pytest.raises(ValueError, match=r"must change by less than 1048576 .* not by 2000000 at sample 1$"):
+        taken(np.array([0, 2_000_000]))
+    with pytest.raises(
+        ValueError, match=r"settings must broadcast against lanes of shape \(2,\), not levant_lambda of"
+    ):
+        VelocityEstimator(RATE, "levant", MOTION, levant_lambda=[2.0, 3.0, 4.0])(np.zeros((2, 5), np.int64))
+    with pytest.raises(ValueError, match="levant_output is no setting; accepted are levant_lambda, levant_alpha"):
+        VelocityEstimator(RATE, "levant", MOTION, levant_output=1)
+    with pytest.raises(ValueError, match="kalman_position must be"):
+        VelocityEstimator(RATE, "kalman", MOTION, kalman_position=[0.1, 1e9])
+    with pytest.raises(ValueError, match="output of levant must be one of u, u1, not 'v'"):
+        VelocityEstimator(RATE, "levant", MOTION, output="v")
+    with pytest.raises(ValueError, match="backend must be one of fixed, float, not 'rtl'"):
+        VelocityEstimator(RATE, "levant", MOTION, backend="rtl")
+    with pytest.raises(ValueError, match=r"estimator must be one of fdm, .* not 'euler'"):
+        VelocityEstimator(RATE, "euler", MOTION)
+
+
+def test_no_counts_are_no_velocities():
+    taken = VelocityEstimator(RATE, "levant", MOTION)
+    assert taken(np.zeros((0,), np.int64)).shape == (0,)
+    assert taken(np.zeros((3, 0), np.int64)).shape == (3, 0)
+    assert taken(swing(5)).shape == (5,)
