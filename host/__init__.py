@@ -14,6 +14,8 @@ from .errors import (
     SilentError,
     TrippedError,
 )
+from .sample_file import SampleFile
+from .samples import Gap, Sample, Samples
 from .status import State, Status, Trip
 
 __all__ = [
@@ -21,11 +23,15 @@ __all__ = [
     "Axis",
     "ChangedError",
     "ForeignError",
+    "Gap",
     "HostError",
     "LateError",
     "NotReadyError",
     "PortError",
     "RefusedError",
+    "Sample",
+    "SampleFile",
+    "Samples",
     "SilentError",
     "State",
     "Status",

@@ -63,6 +63,7 @@ GOOD: dict[str, tuple[str, ...]] = {
     "plot": ("out.png", "out.svg", "out.pdf"),
     "trace": ("out.npz",),
     "out": ("out.csv",),
+    "csv": ("out.csv",),
     "folder": ("verilog",),
     "workers": ("1", "2"),
     "scheduler": ("tcp://127.0.0.1:1",),
