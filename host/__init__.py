@@ -2,9 +2,11 @@
 
 from .axis import Axis
 from .banks import Axes
+from .config import Config, Difference
 from .connect import connect, connect_axes
 from .errors import (
     ChangedError,
+    ConfigError,
     ForeignError,
     HostError,
     LateError,
@@ -22,6 +24,9 @@ __all__ = [
     "Axes",
     "Axis",
     "ChangedError",
+    "Config",
+    "ConfigError",
+    "Difference",
     "ForeignError",
     "Gap",
     "HostError",

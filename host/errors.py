@@ -43,3 +43,7 @@ class NotReadyError(HostError):
 
 class TrippedError(HostError):
     """The axis is TRIPPED: its drive is 0 until the causes are acknowledged and it is armed again."""
+
+
+class ConfigError(ValueError):
+    """A file of a configuration is none, or has a value that its word cannot hold."""
