@@ -11,6 +11,8 @@ from .port import AcknowledgeOption, BaudOption, IdentityOption, PaceOption, Por
 from .set import values_of
 from .watch import Lines
 
+OPENED = "the loop of drive_enable opened, or another program disarmed it"
+
 
 def command(
     port: PortArgument,
@@ -35,6 +37,4 @@ def command(
         for status in axis.watch(seconds=seconds):
             lines.show(status)
             if status.state is not State.ARMED:
-                raise TrippedError(
-                    f"the axis is {status.state.name}: {status.trip or 'the loop of drive_enable opened'}"
-                )
+                raise TrippedError(f"the axis is {status.state.name}: {status.trip or OPENED}")

@@ -3,11 +3,12 @@
 from .axis import Axis
 from .banks import Axes
 from .config import Config, Difference
-from .connect import connect, connect_axes
+from .connect import connect, connect_axes, share
 from .errors import (
     ChangedError,
     ConfigError,
     ForeignError,
+    HeldError,
     HostError,
     LateError,
     NotReadyError,
@@ -16,6 +17,7 @@ from .errors import (
     SilentError,
     TrippedError,
 )
+from .relay import Relay
 from .sample_file import SampleFile
 from .samples import Gap, Sample, Samples
 from .status import State, Status, Trip
@@ -29,11 +31,13 @@ __all__ = [
     "Difference",
     "ForeignError",
     "Gap",
+    "HeldError",
     "HostError",
     "LateError",
     "NotReadyError",
     "PortError",
     "RefusedError",
+    "Relay",
     "Sample",
     "SampleFile",
     "Samples",
@@ -44,4 +48,5 @@ __all__ = [
     "TrippedError",
     "connect",
     "connect_axes",
+    "share",
 ]

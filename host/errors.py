@@ -33,6 +33,10 @@ class RefusedError(HostError):
         self.code = code
 
 
+class HeldError(HostError):
+    """Another program holds the lease of a board that is shared."""
+
+
 class LateError(HostError):
     """What was asked for is too old to be done."""
 

@@ -81,7 +81,7 @@ def test_a_command_loads_nothing_that_most_of_its_runs_do_not_use(name):
     assert set(done.stdout.split()) & LATER == set()
 
 
-OF_A_BOARD = "connect", "set", "config", "arm", "disarm", "home", "watch", "capture", "panel"
+OF_A_BOARD = "connect", "set", "config", "share", "arm", "disarm", "home", "watch", "capture", "panel"
 PORTS = {
     "set": ("nowhere", "wall_stiffness=1"),
     "config": ("save", "nowhere", "new.toml"),
