@@ -113,8 +113,8 @@ class Config:
         for name in (name for name in axis.names if name in words):
             word, used = axis.device.registers[name], axis.get(name)
             if words[name] != round(used / word.lsb):
-                values = (_nearest(word, each) for each in (used, words[name] * word.lsb))
-                found.append(Difference(name, *values, word.unit))
+                wanted = _nearest(word, words[name] * word.lsb)
+                found.append(Difference(name, _nearest(word, used), wanted, word.unit))
         return found
 
     def load(self, axis: Axis, differences: Sequence[Difference]) -> None:

@@ -2,6 +2,7 @@
 
 import socket
 import threading
+import time
 from contextlib import suppress
 
 from ..model.axes.registers import BANK
@@ -17,6 +18,9 @@ GUESTS_MAX = 32
 """The most programs at a board."""
 REST_S = 1.0
 """The time behind which what was begun of a request is dropped: the loopback has no such pauses."""
+GRACE_S, BURST = 5e-3, 4
+"""The time for which the line is kept for the next request of the program that holds the lease, and for how many in a
+row: a beat is two, or four if one is lost. Behind a USB bridge another request in between would take 16 ms."""
 WRITE_MANY = 16
 CONFORMITY = 0x83
 """The identification has objects of its own."""
@@ -25,7 +29,9 @@ CONFORMITY = 0x83
 class Relay:
     """Shares a port among programs. A context manager that ends it.
 
-    A request of the program that holds the lease goes before those of all others, so that it waits for one at most.
+    A request of the program that holds the lease goes before those of all others, and what follows it at once does, up
+    to `BURST` requests. So a beat waits for two requests of others at most, and others are not kept out.
+
     What any program may do at any time is read, and disarm. Nothing is sent that no program has asked for: the board's
     heartbeat is that of the program that holds the lease, and ends with it.
 
@@ -52,9 +58,11 @@ class Relay:
             raise PortError(f"port {number} of {LOOPBACK} cannot be had: {error.strerror}") from None
         self.name = f"{NETWORK}{LOOPBACK}:{self._listener.getsockname()[1]}"
         self.failure: HostError | None = None
-        # Whose turn it is: one request at a time, the holder's first.
+        # Whose turn it is: one request at a time, the holder's first; and how many wait, of the holder and of others.
         self._turns = threading.Condition()
-        self._busy, self._holders = False, 0
+        self._busy, self._waiting = False, {True: 0, False: 0}
+        # Until when the line is kept for the holder, and how many requests in a row it has had.
+        self._kept_s, self._in_a_row = 0.0, 0
         self._connections: set[socket.socket] = set()
         self._welcoming = threading.Thread(target=self._welcome, name="hardwall-relay", daemon=True)
         self._welcoming.start()
@@ -138,10 +146,7 @@ class Relay:
             name = self.holder.encode()[: FRAME_MAX // 2]
             return request[:4] + bytes([CONFORMITY, 0, 0, 1, LEASE_OBJECT, len(name)]) + name
         with self._turns:
-            holds = self._lease.holder is guest
-            self._holders += holds
-            self._turns.wait_for(lambda: not self._busy and (holds or not self._holders))
-            self._holders -= holds
+            self._wait_for_turn(self._lease.holder is guest)
             if (refused := self._refusal(guest, request)) is not None:
                 self._turns.notify_all()
                 return bytes([UNIT, function | 0x80, refused])
@@ -157,7 +162,25 @@ class Relay:
                 self._busy = False
                 if function in WRITES and not self._disarms_alone(request):
                     self._lease.wrote(guest)
+                self._in_a_row = self._in_a_row + 1 if self._lease.holder is guest else 0
+                self._kept_s = time.monotonic() + (GRACE_S if 0 < self._in_a_row < BURST else 0.0)
                 self._turns.notify_all()
+
+    def _wait_for_turn(self, holds: bool) -> None:
+        """Wait, with the lock, until a request of the holder, or of another program, may go out."""
+        self._waiting[holds] += 1
+        while not self._may_go(holds):
+            # The end of a request wakes all; the time for which the line is kept ends by itself.
+            self._turns.wait(GRACE_S)
+        self._waiting[holds] -= 1
+
+    def _may_go(self, holds: bool) -> bool:
+        if self._busy:
+            return False
+        enough = self._in_a_row >= BURST
+        if holds:
+            return not (enough and self._waiting[False])
+        return enough or not (self._waiting[True] or time.monotonic() < self._kept_s)
 
     def _refusal(self, guest: Guest, request: bytes) -> int | None:
         """Return the exception that answers a request that is not carried to the board; None for one that is."""

@@ -10,7 +10,7 @@ from ..model.checks import FieldError, shown
 from ..model.register import Kind, Register
 from .bounds import word_of
 from .device import Device
-from .errors import ChangedError, RefusedError
+from .errors import ChangedError, HeldError, RefusedError
 from .port import Port
 
 OF_THE_HEARTBEAT = ("heartbeat", "acknowledged")
@@ -141,7 +141,7 @@ class Words:
         self._tried = given
         try:
             self._port.write(address, registers, check=self._check)
-        except RefusedError:
+        except (RefusedError, HeldError, ChangedError):
             self._tried = {}
             raise
         self._written, self._tried = self._written | given, {}

@@ -8,16 +8,17 @@ from contextlib import ExitStack, contextmanager
 import pytest
 
 from hardwall.host import leases
+from hardwall.host import relay as relays
 from hardwall.host.axis import Axis
 from hardwall.host.connect import connect, share
 from hardwall.host.errors import ChangedError, HeldError, PortError, SilentError
 from hardwall.host.port import Port
-from hardwall.host.relay import GUESTS_MAX, Relay
+from hardwall.host.relay import BURST, GUESTS_MAX, Relay
 from hardwall.host.samples import Samples
 from hardwall.host.status import State
 from hardwall.model.link.line import framed
 from host.twin_board import PATIENT, TwinBoard
-from support.processes import wait_until
+from support.processes import PATIENCE_S, wait_until
 
 FOR_GOOD = 1 << 30
 
@@ -259,16 +260,15 @@ def test_a_disarm_beside_something_else_needs_the_lease(relay, come, registers, 
 
 
 class Held(Port):
-    """A port whose answers wait until a test lets them go; it keeps the requests in their order."""
+    """A port that keeps the requests in their order, and answers to none while a test holds it."""
 
     def __init__(self, port: Port):
-        self._port, self.asked = port, []
-        self.let, self.free = threading.Semaphore(0), True
+        self._port, self.asked, self.free = port, list[bytes](), threading.Event()
+        self.free.set()
 
     def relay(self, request: bytes) -> bytes:
         self.asked.append(request)
-        if not self.free:
-            self.let.acquire()
+        assert self.free.wait(PATIENCE_S)
         return self._port.relay(request)
 
     @property
@@ -279,26 +279,55 @@ class Held(Port):
         self._port.close()
 
 
-def test_the_holder_waits_for_one_request_at_most(board, relay, come, registers):
+@contextmanager
+def waiting(relay: Relay, others: int) -> Iterator[tuple[Held, list[socket.socket]]]:
+    """Let a program's read be under way, and those of some others wait; yield the port, held, and their lines."""
     relay._port = held = Held(relay._port)
-    writer = come()
-    writer.set(wall_stiffness=1000.0)
-    writer._heartbeat.rest()
-    with line_to(relay) as first, line_to(relay) as second, line_to(relay) as third:
+    with ExitStack() as stack:
+        lines = [stack.enter_context(line_to(relay)) for _ in range(1 + others)]
+        for line in lines:
+            answered(line, READ_LAYOUT, 9)
         held.asked.clear()
-        held.free = False
-        first.sendall(READ_LAYOUT)
-        wait_until(lambda: len(held.asked) == 1)
-        second.sendall(READ_LAYOUT)
-        third.sendall(READ_LAYOUT)
-        wait_until(lambda: len(relay._turns._waiters) == 2)
-        setting = threading.Thread(target=writer._words.set, args=({"wall_damping": 5.0},))
-        setting.start()
-        wait_until(lambda: len(relay._turns._waiters) == 3)
-        held.free = True
-        held.let.release(10)
-        setting.join()
-    assert [request[1] for request in held.asked[:2]] == [3, 16]
+        held.free.clear()
+        lines[0].sendall(READ_LAYOUT)
+        wait_until(lambda: held.asked)
+        for line in lines[1:]:
+            line.sendall(READ_LAYOUT)
+        wait_until(lambda: relay._waiting[False] == others)
+        yield held, lines
+
+
+def test_a_beat_waits_for_one_request_and_others_are_not_kept_out(relay, registers, monkeypatch):
+    # Longer than a busy machine takes for the next request.
+    monkeypatch.setattr(relays, "GRACE_S", 2.0)
+    beat = registers["heartbeat"].address
+    read = framed(bytes([1, 3]) + beat.to_bytes(2, "big") + b"\0\2")
+    write = framed(bytes([1, 16]) + beat.to_bytes(2, "big") + bytes([0, 2, 4, 0, 0, 0, 1]))
+    with line_to(relay) as holder:
+        answered(holder, write, 8)
+        assert relay.holder
+        with waiting(relay, 3) as (held, lines):
+            holder.sendall(read)
+            wait_until(lambda: relay._waiting[True] == 1)
+            held.free.set()
+            assert answered(holder, b"", 9)[1] == 3
+            # What follows at once is kept the line for; no more than a burst.
+            for _ in range(2 * BURST):
+                answered(holder, write, 8)
+            for line in lines:
+                answered(line, b"", 9)
+    order = "".join("r" if request[2:4] == b"\0\0" else "H" for request in held.asked)
+    # The read that was under way; a burst of the holder's; and the three others in their turns.
+    assert order.startswith("r" + BURST * "H" + "r"), order
+    assert order.count("r") == 4
+
+
+def test_without_a_holder_all_wait_alike(relay):
+    with waiting(relay, 3) as (held, lines):
+        held.free.set()
+        for line in lines:
+            assert answered(line, b"", 9)[1] == 3
+    assert len(held.asked) == 4
 
 
 def test_more_programs_than_it_takes_are_sent_away(relay):
