@@ -130,6 +130,7 @@ class Config:
         Raises:
             NotReadyError: if the axis is ARMED.
             ChangedError: if the file is of another board, or the differences are others now.
+            HeldError: if another program holds the lease of a board that is shared.
             ConfigError: if a word is none of the board's, or cannot hold its value.
             HostError: if the board is not reached. The message says whether it has its words of before.
         """
@@ -138,6 +139,8 @@ class Config:
         if self.differences(axis) != list(differences):
             raise ChangedError("the words of the board are others than those that were shown: nothing was loaded")
         before = {name: axis.get(name) for name in axis.names}
+        # Where another program may write, or has written, that is said before anything is.
+        axis.renew()
         try:
             axis.set(**{**before, **self.words})
             if left := self.differences(axis):

@@ -98,9 +98,12 @@ def test_the_owner_of_the_port_is_killed_and_the_board_trips(virtual):
         share.kill()
         share.wait()
         for program in ("arm", "watch"):
-            code, _, err = ended(programs[program])
+            code, out, err = ended(programs[program])
             assert code == 1
             assert "is gone: is the cable in, and the board powered?" in err
+        # A log that ends so says what it has, too.
+        assert json.loads(out.splitlines()[-1])["samples"] > 0
+        assert re.search(r"; \d+ samples at 20 Hz, \d+ missed", err)
         wait_until(lambda: seen(virtual.path).state is State.TRIPPED)
         assert seen(virtual.path).trip.first == ("link_timeout",)
 

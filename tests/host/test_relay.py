@@ -10,6 +10,7 @@ import pytest
 from hardwall.host import leases
 from hardwall.host import relay as relays
 from hardwall.host.axis import Axis
+from hardwall.host.config import Config
 from hardwall.host.connect import connect, share
 from hardwall.host.errors import ChangedError, HeldError, PortError, SilentError
 from hardwall.host.port import Port
@@ -148,6 +149,18 @@ def test_nothing_beats_for_a_program_that_is_gone(board, relay, come):
     beats = board.server.file.active["heartbeat"]
     list(Samples(reader, 100.0, 0.5))
     assert board.server.file.active["heartbeat"] == beats
+
+
+def test_a_configuration_is_not_loaded_beside_another_program(board, come, tmp_path):
+    writer, other = come(), come()
+    Config.of(writer).write(tmp_path / "words.toml", writer.device)
+    writer.set(wall_stiffness=1000.0)
+    late = come()
+    config, before = Config.read(tmp_path / "words.toml"), dict(board.server.file.active)
+    for axis in (other, late):
+        with pytest.raises((HeldError, ChangedError), match=r"the lease of the board|another host writes to it"):
+            config.load(axis, config.differences(axis))
+    assert board.server.file.active | {"heartbeat": 0} == before | {"heartbeat": 0}
 
 
 def test_a_silent_board_is_silent_to_all_and_comes_back(board, come):
