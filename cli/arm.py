@@ -9,7 +9,9 @@ from ..host.port import BAUD
 from .options import within
 from .port import AcknowledgeOption, BaudOption, IdentityOption, PaceOption, PortArgument, SecondsOption, axis_at
 from .set import values_of
-from .watch import PERIOD_S, Lines
+from .watch import Lines
+
+OPENED = "the loop of drive_enable opened, or another program disarmed it"
 
 
 def command(
@@ -32,9 +34,7 @@ def command(
         if acknowledge:
             axis.acknowledge()
         axis.arm()
-        for status in axis.watch(PERIOD_S, seconds):
+        for status in axis.watch(seconds=seconds):
             lines.show(status)
             if status.state is not State.ARMED:
-                raise TrippedError(
-                    f"the axis is {status.state.name}: {status.trip or 'the loop of drive_enable opened'}"
-                )
+                raise TrippedError(f"the axis is {status.state.name}: {status.trip or OPENED}")

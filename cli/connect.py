@@ -74,6 +74,7 @@ def _summary(port: str, axis: Axis) -> dict[str, Any]:
         "force_n": status.force_n,
         "flags": list(status.flags),
         "a_channel_idle": status.a_channel_idle,
+        "lease": None if axis.lease is None else axis.lease or "free",
         "first_causes": list(trip.first) if trip else [],
         "latched_causes": list(trip.causes) if trip else [],
         "link": {name.removeprefix("link_"): count for name, count in axis.counters.items()},

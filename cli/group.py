@@ -21,6 +21,8 @@ COMMANDS = {
     "virtual": "Run the board of a scene, with its plant, behind a serial port that a host opens.",
     "connect": "What the board at a port is: its identity, its state, why it tripped, and every register.",
     "set": "Write words of a board, in SI units, and commit them together.",
+    "config": "Save the words of a board to a file, load them into it again, or show what differs.",
+    "share": "Have the port of a board for several programs: one that writes, and any number that read.",
     "arm": "Let a board drive, and keep it so while this command runs.",
     "disarm": "Make a board's drive 0.",
     "home": "Find the index of a board's encoder by hand, and make it the origin.",

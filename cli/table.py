@@ -8,8 +8,8 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from ..model.axes.axis import AXES_MAX
 from ..model.checks import shown
+from ..model.runtime.regular_file import content_of
 from ..model.runtime.result import table_of
-from ..sim.jobs.regular_file import content_of
 from ..sim.walls.hit_rows import NOTES, NUMBERS, row_of
 from .errors import BadInput
 from .terminal import log, show

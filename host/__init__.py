@@ -2,10 +2,13 @@
 
 from .axis import Axis
 from .banks import Axes
-from .connect import connect, connect_axes
+from .config import Config, Difference
+from .connect import connect, connect_axes, share
 from .errors import (
     ChangedError,
+    ConfigError,
     ForeignError,
+    HeldError,
     HostError,
     LateError,
     NotReadyError,
@@ -14,18 +17,30 @@ from .errors import (
     SilentError,
     TrippedError,
 )
+from .relay import Relay
+from .sample_file import SampleFile
+from .samples import Gap, Sample, Samples
 from .status import State, Status, Trip
 
 __all__ = [
     "Axes",
     "Axis",
     "ChangedError",
+    "Config",
+    "ConfigError",
+    "Difference",
     "ForeignError",
+    "Gap",
+    "HeldError",
     "HostError",
     "LateError",
     "NotReadyError",
     "PortError",
     "RefusedError",
+    "Relay",
+    "Sample",
+    "SampleFile",
+    "Samples",
     "SilentError",
     "State",
     "Status",
@@ -33,4 +48,5 @@ __all__ = [
     "TrippedError",
     "connect",
     "connect_axes",
+    "share",
 ]

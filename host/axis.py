@@ -163,6 +163,11 @@ class Axis(Named):
             raise NotReadyError("the axis is not armed: it was disarmed or closed meanwhile")
 
     @property
+    def lease(self) -> str | None:
+        """The program that holds the lease of a board that is shared, empty if none does; None if it is not shared."""
+        return self._port.lease
+
+    @property
     def counters(self) -> dict[str, int]:
         """What the link has counted since the board's reset, by name; they wrap at 65536."""
         block = self.device.of_kind(Kind.COUNTER)
@@ -404,5 +409,10 @@ class Axis(Named):
         return "the loop of drive_enable is open"
 
     def _let_go(self) -> None:
+        """Disarm what this program does not want ARMED; where another one holds the lease, that one does."""
         if self._unwanted:
+            if self.lease is not None:
+                # The beat that the board has already is none, but it needs the lease.
+                word = self.device.registers["heartbeat"]
+                self._port.write(word.address, word.to_registers(self.read(word.name)), once=True)
             self.disarm()

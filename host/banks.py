@@ -37,6 +37,11 @@ class BankPort(Port):
         """That of the line."""
         return self._line.pace
 
+    @property
+    def lease(self) -> str | None:
+        """That of the line."""
+        return self._line.lease
+
     def read(self, address: int, count: int) -> tuple[int, ...]:
         """Return successive registers; what there is once takes another request. Errors are those of `Port.read`."""
         places = range(address, address + count)

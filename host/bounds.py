@@ -30,6 +30,12 @@ def check_within(field: str, word: Register, value: float) -> None:
         raise FieldError(field, f"must be a whole number of {low} to {high}, not {shown(value)}")
 
 
+def word_of(word: Register, value: float) -> int:
+    """Return the word nearest to an SI value, which is checked before it is rounded; errors are `check_within`'s."""
+    check_within(word.name, word, value)
+    return min(max(round(value / word.lsb), word.low), word.high)
+
+
 def is_whole(word: Register) -> bool:
     """Return whether a word is a plain number, a choice for instance, with nothing between two values."""
     return word.lsb == 1 and not word.unit

@@ -120,7 +120,7 @@ def reason(error: Exception) -> str:
     if number in (errno.EACCES, errno.EPERM):
         return "it is not yours to open; on most systems it is, once you are in the group dialout"
     if number in (errno.EAGAIN, errno.EBUSY):
-        return "another program has it, and a board has one host at a time"
+        return "another program has it, and a board has one host at a time, unless `hardwall share` has it for several"
     if number in (errno.ECONNREFUSED, errno.ETIMEDOUT):
         return "nothing listens there"
     if number == errno.EISDIR or "configure" in str(error):

@@ -8,6 +8,7 @@ from .banks import Axes
 from .device import Device, read_device
 from .errors import ChangedError
 from .port import ANSWER_S, BAUD, Port
+from .relay import Relay
 
 Held = TypeVar("Held")
 
@@ -43,6 +44,21 @@ def connect_axes(
 ) -> Axes:
     """Return all axes of the board at a port; of a board of one axis that one. Arguments and errors are `connect`'s."""
     return _held(Axes, Port(name, baud, answer_s, pace), identity)
+
+
+def share(
+    name: str,
+    baud: int = BAUD,
+    answer_s: float = ANSWER_S,
+    identity: str | None = None,
+    pace: float | None = None,
+    number: int = 0,
+) -> Relay:
+    """Return what lets many programs have the board at a port, each by `connect(relay.name)`.
+
+    `number` is the port of the loopback, 0 for any that is free. The other arguments and the errors are `connect`'s.
+    """
+    return _held(lambda port, device: Relay(port, device, number), Port(name, baud, answer_s, pace), identity)
 
 
 def _held(hold: Callable[[Port, Device], Held], port: Port, identity: str | None) -> Held:

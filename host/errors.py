@@ -33,6 +33,10 @@ class RefusedError(HostError):
         self.code = code
 
 
+class HeldError(HostError):
+    """Another program holds the lease of a board that is shared."""
+
+
 class LateError(HostError):
     """What was asked for is too old to be done."""
 
@@ -43,3 +47,7 @@ class NotReadyError(HostError):
 
 class TrippedError(HostError):
     """The axis is TRIPPED: its drive is 0 until the causes are acknowledged and it is armed again."""
+
+
+class ConfigError(ValueError):
+    """A file of a configuration is none, or has a value that its word cannot hold."""

@@ -11,11 +11,12 @@ from pymodbus.exceptions import ConnectionException, ModbusException
 from pymodbus.pdu import ModbusPDU
 
 from ..model.checks import check_int, check_range
-from ..model.link.board_pace import PACE_LEAST, Told
-from ..model.link.line import FRAME_MAX
+from ..model.link.board_pace import NETWORK, PACE_LEAST, Told
 from ..model.link.server import FAILURE, READ_MAX, VALUE, WRITE_MAX
 from .clients import client_of, reason
-from .errors import ForeignError, PortError, RefusedError, SilentError
+from .errors import ChangedError, ForeignError, HeldError, PortError, RefusedError, SilentError
+from .leases import HELD, LEASE_OBJECT, NO_ANSWER, STALE
+from .requests import Request
 
 BAUD, BAUD_MAX = 921_600, 4_000_000
 """The board's rate unless its clock is slow, and the highest of a serial port."""
@@ -47,6 +48,8 @@ class Port:
     bits of request and answer, `DEVICE_BITS`, `BRIDGE_S` and `MACHINE_S`, which is some 40 ms at 921 600 baud. What may
     be asked twice is then asked again, until `answer_s` is over.
 
+    A port that `hardwall share` serves loses nothing and always answers, though later: it is waited for `answer_s`.
+
     Args:
         name: a serial port's path, or tcp://HOST:PORT.
         baud: the rate of a serial port.
@@ -74,6 +77,8 @@ class Port:
             self._leave()
             raise
         self._in_step, self._gone = False, False
+        # Whether other programs have the board, too, behind this port.
+        self._shared = False
         # Whether it has ever been in step; and when something was last sent, of which the board may await the rest.
         self._known, self._sent_s = False, time.monotonic()
         try:
@@ -114,7 +119,7 @@ class Port:
         registers: list[int] = []
         while len(registers) < count:
             some = min(count - len(registers), READ_MAX)
-            registers += self._ask(_Request.reading(address + len(registers), some)).registers
+            registers += self._ask(Request.reading(address + len(registers), some)).registers
         return tuple(registers)
 
     def write(
@@ -135,13 +140,32 @@ class Port:
         """
         if not 1 <= len(registers) <= WRITE_MAX:
             raise ValueError(f"registers must be 1 to {WRITE_MAX}, not {len(registers)}")
-        self._ask(_Request.writing(address, registers), once, check)
+        self._ask(Request.writing(address, registers), once, check)
 
     def identify(self) -> dict[int, bytes]:
         """Return the objects by which the device identifies itself: 0 its vendor, 1 its product, 2 its revision."""
-        return dict(self._ask(_Request.identifying()).information)
+        return dict(self._ask(Request.identifying()).information)
 
-    def _ask(self, request: "_Request", once: bool = False, check: Callable[[], None] | None = None) -> Any:
+    def relay(self, request: bytes) -> bytes:
+        """Return the answer to another program's request, both as unit, function and data; it is asked once.
+
+        Raises:
+            HostError: if the board does not answer.
+        """
+        return self._ask(Request.relaying(request), once=True).frame
+
+    @property
+    def lease(self) -> str | None:
+        """The program that holds the lease of a board that is shared, empty if none does; None if it is not shared.
+
+        Raises:
+            HostError: if nothing answers.
+        """
+        if not self._shared:
+            return None
+        return self._ask(Request.lease()).information[LEASE_OBJECT].decode("utf-8", "replace")
+
+    def _ask(self, request: Request, once: bool = False, check: Callable[[], None] | None = None) -> Any:
         """Return the answer to a request, which is asked again without one, in a turn of its own each time."""
         until_s, silent = time.monotonic() + self._answer_s, None
         while True:
@@ -159,7 +183,7 @@ class Port:
                 if once or time.monotonic() >= until_s:
                     raise silent from None
 
-    def _turn(self, request: "_Request", check: Callable[[], None] | None) -> ModbusPDU:
+    def _turn(self, request: Request, check: Callable[[], None] | None) -> ModbusPDU:
         if not self._in_step:
             self._find_step()
         if check:
@@ -167,6 +191,7 @@ class Port:
         answer = self._answer(request)
         if answer.isError():
             code = getattr(answer, "exception_code", 0)
+            self._check_shared(request, code)
             said = "it does not do that in its present state" if code == FAILURE else EXCEPTIONS.get(code, f"{code}")
             raise RefusedError(f"the board refuses to {request.what}: {said}", code)
         if not request.fits(answer):
@@ -174,9 +199,25 @@ class Port:
             raise ForeignError(f"the answer to the request to {request.what} does not fit it")
         return answer
 
-    def _answer(self, request: "_Request") -> Any:
+    def _check_shared(self, request: Request, code: int) -> None:
+        """Raise what an exception of `hardwall share` says, which is none of the board's."""
+        if code == NO_ANSWER:
+            raise SilentError(f"nothing answers behind {self.name} to the request to {request.what}")
+        if code == STALE:
+            raise ChangedError(
+                f"another program has written to the board at {self.name} since this one came: connect again"
+            )
+        if code == HELD:
+            said = self._answer(Request.lease())
+            holder = b"" if said.isError() else said.information.get(LEASE_OBJECT, b"")
+            name = holder.decode("utf-8", "replace") or "another program"
+            raise HeldError(
+                f"the lease of the board at {self.name} is held by {name}: it alone writes, others may read and disarm"
+            )
+
+    def _answer(self, request: Request) -> Any:
         wait_s = self._answer_s
-        if self._known:
+        if self._known and not self._shared:
             bits = BYTE_BITS * request.size + DEVICE_BITS
             wait_s = min(wait_s, (bits / self._baud + BRIDGE_S + MACHINE_S) / self.pace)
         self._sent_s = time.monotonic()
@@ -205,9 +246,11 @@ class Port:
         for tries_left in reversed(range(TRIES)):
             self._drain(silent_s)
             silent_s = pause_s
-            request = _Request.echoing(secrets.token_bytes(2))
+            request = Request.echoing(secrets.token_bytes(2))
             with suppress(*([SilentError] if tries_left else [])):
                 if request.fits(self._answer(request)):
+                    if not self._known and self.name.startswith(NETWORK):
+                        self._shared = not self._answer(Request.lease()).isError()
                     self._in_step = self._known = True
                     return
         if self._known:
@@ -226,48 +269,3 @@ class Port:
         except ConnectionException:
             self._gone = True
             raise PortError(f"{self.name} is gone: is the cable in, and the board powered?") from None
-
-
-class _Request:
-    """A request: what it is about, the bytes of it and its answer, how it is sent, and whether an answer fits it."""
-
-    def __init__(self, what: str, size: int, send: Callable[[Any], Any], fits: Callable[[Any], bool]):
-        self.what, self.size, self.send, self.fits = what, size, send, fits
-
-    @classmethod
-    def reading(cls, address: int, count: int) -> "_Request":
-        return cls(
-            f"read {count} registers from {address:#06x} on",
-            8 + 5 + 2 * count,
-            lambda client: client.read_holding_registers(address, count=count),
-            lambda answer: len(getattr(answer, "registers", ())) == count,
-        )
-
-    @classmethod
-    def writing(cls, address: int, registers: tuple[int, ...]) -> "_Request":
-        return cls(
-            f"write {len(registers)} registers from {address:#06x} on",
-            9 + 2 * len(registers) + 8,
-            lambda client: client.write_registers(address, list(registers)),
-            lambda answer: (
-                (getattr(answer, "address", None), getattr(answer, "count", None)) == (address, len(registers))
-            ),
-        )
-
-    @classmethod
-    def identifying(cls) -> "_Request":
-        return cls(
-            "identify itself",
-            7 + FRAME_MAX,
-            lambda client: client.read_device_information(read_code=1, object_id=0),
-            lambda answer: hasattr(answer, "information"),
-        )
-
-    @classmethod
-    def echoing(cls, word: bytes) -> "_Request":
-        return cls(
-            "repeat a word",
-            8 + 8,
-            lambda client: client.diag_query_data(word),
-            lambda answer: getattr(answer, "message", None) == word,
-        )

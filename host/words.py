@@ -1,16 +1,16 @@
 """The words of a board in SI units: what was written, and one request for all that takes effect together."""
 
 import difflib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from ..model.axes.registers import is_shared
 from ..model.axis.registers import ACTIVE, PULSES, WRITTEN
 from ..model.checks import FieldError, shown
 from ..model.register import Kind, Register
-from .bounds import check_within
+from .bounds import word_of
 from .device import Device
-from .errors import ChangedError, RefusedError
+from .errors import ChangedError, HeldError, RefusedError
 from .port import Port
 
 OF_THE_HEARTBEAT = ("heartbeat", "acknowledged")
@@ -88,7 +88,7 @@ class Words:
         return self._once.get(name, self._written[name])
 
     def set(self, values: Mapping[str, Any]) -> None:
-        """Write words in SI units: live ones first, each of which acts at once; then the others, all at one sample.
+        """Write words in SI units: live ones first, which act at once; then the others, all at one sample.
 
         A value is rounded to the word's unit. Nothing is written unless every value is within its range.
 
@@ -100,16 +100,30 @@ class Words:
             HostError: if the board does not answer, or refuses. What had no answer may have been carried out: `get`
                 says what is used.
         """
-        given = {name: self._rounded(self._word(name), value) for name, value in values.items()}
+        given = {name: word_of(self._word(name), value) for name, value in values.items()}
         committed = [name for name in given if self._words[name].kind is Kind.WORD]
         if self._tried:
             self.check()
-        for name, value in given.items():
-            word = self._words[name]
-            if word.kind is Kind.LIVE:
-                self._write(word.address, word.to_registers(value), {name: value})
+        for run in self._runs(given.keys() - committed):
+            registers = sum((word.to_registers(given[word.name]) for word in run), ())
+            self._write(run[0].address, registers, {word.name: given[word.name] for word in run})
         if committed:
             self._commit({name: given[name] for name in committed})
+
+    def _runs(self, names: Collection[str]) -> list[list[Register]]:
+        """Return live words as runs of which a request each is enough: those whose addresses follow each other.
+
+        What there is once for several axes is elsewhere than the words around it.
+        """
+        runs: list[list[Register]] = []
+        for word in (word for word in self._words.values() if word.name in names):
+            last = runs[-1][-1] if runs else None
+            together = last and (last.name in self._once) == (word.name in self._once)
+            if last and together and word.address == last.address + last.size:
+                runs[-1].append(word)
+            else:
+                runs.append([word])
+        return runs
 
     def _commit(self, given: dict[str, int]) -> None:
         """Write words and their commit in one request, with what lies between as it was written last."""
@@ -127,7 +141,7 @@ class Words:
         self._tried = given
         try:
             self._port.write(address, registers, check=self._check)
-        except RefusedError:
+        except (RefusedError, HeldError, ChangedError):
             self._tried = {}
             raise
         self._written, self._tried = self._written | given, {}
@@ -154,9 +168,3 @@ class Words:
 
     def _si(self, name: str, word: int) -> float:
         return word * self._words[name].lsb
-
-    @staticmethod
-    def _rounded(word: Register, value: float | bool) -> int:
-        """Return the word nearest to an SI value, which is checked before it is rounded."""
-        check_within(word.name, word, value)
-        return min(max(round(value / word.lsb), word.low), word.high)

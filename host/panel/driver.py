@@ -27,6 +27,8 @@ KEPT = 4096
 """Samples that are kept for tabs."""
 LATE = "the board did not answer in time: nothing was done"
 NO_ANSWER = "no board answers: nothing was done"
+LEASE_LOOK_S = 1.0
+"""The time between two looks at who holds the lease of a board that is shared."""
 SAID_S = 8.0
 """How long it is said why an act had no effect."""
 
@@ -66,7 +68,7 @@ class Driver:
         self._lock, self._ended = threading.Lock(), threading.Event()
         self._samples: deque[Sample] = deque(maxlen=KEPT)
         self._pings: dict[str, float] = {}
-        self._taken, self._renewed_s, self._said_s = 0, 0.0, 0.0
+        self._taken, self._renewed_s, self._said_s, self._leased_s = 0, 0.0, 0.0, -math.inf
         self._recorder = Recorder()
         self._homing: Generator[str, None, Homed] | None = None
         self._axis: Axis | None = None
@@ -349,7 +351,17 @@ class Driver:
             self._samples.append(
                 Sample(now_s, status.position_m, status.velocity_m_per_s, status.wall_force_n, status.force_n)
             )
+        if now_s - self._leased_s > LEASE_LOOK_S:
+            self._leased_s = now_s
+            self._look_at_lease(axis)
         holder = self.view.holder if status.state is State.ARMED else None
         self._pace.take(now_s, status.stamp_s)
         measured = {"pace": self._pace.pace, "looks_hz": self._pace.looks_hz}
         self._see(status=status, lost="", holder=holder, **measured)
+
+    def _look_at_lease(self, axis: Axis) -> None:
+        """See which program may write to a board that is shared; who had the lease may have written words."""
+        before, lease = self.view.lease, axis.lease
+        if before is not None and lease != before:
+            self._keep({name: axis.get(name) for name in self.view.values})
+        self._see(lease=lease)

@@ -37,6 +37,7 @@ class View:
         status: what it does; None while it is not reached.
         connected: whether the port is open; lost: why the board is not reached.
         holder: the tab that armed it; None if none did.
+        lease: the program that holds the lease of a board that is shared, empty if none does; None if it is not shared.
         said: why the last act had no effect; empty if it had.
         pace: seconds of the board in a second; None while it is not known.
         looks_hz: how often the board is read.
@@ -52,6 +53,7 @@ class View:
     connected: bool = False
     lost: str = ""
     holder: str | None = None
+    lease: str | None = None
     said: str = ""
     pace: float | None = None
     looks_hz: float = 0.0
@@ -107,7 +109,9 @@ def _words(view: View, tab: str) -> tuple[str, str, str]:
         why = f"The axis drives, with up to {limit_n:g} N."
         if view.holder == tab:
             return "ARMED", why, "This tab keeps it armed. Hide or close it, and the board is disarmed."
-        return "ARMED", why, "Another tab armed it. Here you may disarm."
+        # Where no tab holds it, another program has armed it.
+        who = "Another tab" if view.holder else view.lease or "Another program"
+        return "ARMED", why, f"{who} armed it. Here you may disarm."
     return "DISARMED", "The drive is 0, and the wall is not there.", "Arm, and the wall comes slowly."
 
 

@@ -26,10 +26,11 @@ TO_THE_START_OF_THE_LINE, SHOW_THE_CURSOR = "\r\x1b[K", "\x1b[?25h"
 
 @dataclass
 class _Kept:
-    """The results that outlive this process, and the way to go on from them."""
+    """The results that outlive this process, the way to go on from them, and what else there is to say of the run."""
 
     results: int = 0
     way: str = "the same command goes on from there"
+    said: Callable[[], str] | None = None
 
 
 _kept = _Kept()
@@ -69,8 +70,15 @@ def go_on_by(way: str) -> None:
     _kept.way = way
 
 
+def said_by(say: Callable[[], str]) -> None:
+    """Let a function say what there is of a run that is ended: the end of `remark` if no results are counted."""
+    _kept.said = say
+
+
 def remark() -> str:
     """Return the end of a message that says what is kept of an unfinished run, and how to go on; often empty."""
+    if not _kept.results and _kept.said:
+        return f"; {_kept.said()}"
     if not _kept.results:
         return ""
     results = "1 new result is" if _kept.results == 1 else f"{_kept.results} new results are"

@@ -25,9 +25,9 @@ from typing import Any
 
 from ... import sim
 from ...model.runtime.build_folder import build_dir, not_kept, shown_path, warn_once
+from ...model.runtime.regular_file import content_of
 from ...model.runtime.stages import logger
 from ...model.runtime.termination import count_kept
-from .regular_file import content_of
 
 ROOT = Path(__file__).absolute().parents[2]
 ROOMS = ("model", "hdl", "sim", "constraints")

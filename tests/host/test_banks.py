@@ -10,11 +10,13 @@ from hardwall.host import (
     Axis,
     ChangedError,
     ForeignError,
+    HeldError,
     NotReadyError,
     SilentError,
     State,
     connect,
     connect_axes,
+    share,
 )
 from hardwall.host.device import AXES_AT
 from hardwall.model.axes import register_file as banked_file
@@ -235,3 +237,15 @@ def test_too_many_axes_are_none_of_ours(board):
     board.server.file.live[AXES_AT + 1] = 33
     with pytest.raises(ForeignError, match="must have at most 32 axes, not 33"):
         connect_axes(board.name, **PATIENT)
+
+
+def test_of_a_board_that_is_shared_any_program_may_disarm_each_axis(board):
+    with share(board.name, **PATIENT) as relay, connect_axes(relay.name, **PATIENT) as first:
+        for axis in first:
+            axis.arm()
+        with connect_axes(relay.name, **PATIENT) as second:
+            with pytest.raises(HeldError):
+                second[1].set(wall_stiffness=1.0)
+            assert states(first) == [ARMED, ARMED, ARMED]
+            second[2].disarm()
+            assert states(first) == [ARMED, ARMED, DISARMED]

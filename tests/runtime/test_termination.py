@@ -45,6 +45,16 @@ REMARKS = {
 }
 
 
+def test_a_run_says_what_there_is_of_it_unless_results_are_kept():
+    termination.begin()
+    termination.said_by(lambda: "7 samples")
+    assert termination.remark() == "; 7 samples"
+    termination.count_kept()
+    assert termination.remark().startswith("; 1 new result is kept")
+    termination.begin()
+    assert termination.remark() == ""
+
+
 # What is undone may not print: the signal may come while this program does.
 SLOWLY = """
 import os, time

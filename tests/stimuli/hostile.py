@@ -63,6 +63,9 @@ GOOD: dict[str, tuple[str, ...]] = {
     "plot": ("out.png", "out.svg", "out.pdf"),
     "trace": ("out.npz",),
     "out": ("out.csv",),
+    "csv": ("out.csv",),
+    "act": ("save", "load", "diff"),
+    "saved": ("config.toml",),
     "folder": ("verilog",),
     "workers": ("1", "2"),
     "scheduler": ("tcp://127.0.0.1:1",),
@@ -211,6 +214,13 @@ def _report() -> str:
     )
 
 
+def _config() -> str:
+    return (
+        '[board]\nidentity = "0123456789abcdef"\nclock_hz = 1000000\nclocks_per_sample = 100\n'
+        "capture_registers = 16384\naxes = 1\n\n[words]\nwall_stiffness = 2000.0  # N/m\nwall_left = 0\n"
+    )
+
+
 @st.composite
 def _parameter(draw: st.DrawFn, parameter: Any) -> list[str]:
     """Return the words of one option or argument."""
@@ -250,7 +260,8 @@ def calls(draw: st.DrawFn, name: str) -> Call:
     if draw(st.integers(0, 19)) == 0:
         words.insert(draw(st.integers(0, len(words))), draw(_hostile()))
     files = {}
-    for file, text in (("scene.toml", read("seed-2011")), ("recording.csv", _recording()), ("report.json", _report())):
+    texts = {"scene.toml": read("seed-2011"), "recording.csv": _recording(), "report.json": _report()}
+    for file, text in (texts | {"config.toml": _config()}).items():
         if file in " ".join(words):
             files[file] = draw(_spoilt(text))
     return Call(tuple(words), files, draw(_mostly(st.just({}), st.sampled_from(ENVIRONS))))

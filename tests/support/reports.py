@@ -17,10 +17,18 @@ def check(command: str, report: Any) -> None:
     assert not errors, "\n".join(f"{command}: {error.json_path}: {error.message[:300]}" for error in errors)
 
 
+LINES = ("watch",)
+"""The commands that print an object a line."""
+
+
 def check_text(command: str, text: str) -> None:
-    """Assert that a text is one JSON object, without NaN or infinity, that the schema of its command describes."""
+    """Assert that a text is one JSON object, without NaN or infinity, that the schema of its command describes.
+
+    Of a command in `LINES` every line is one.
+    """
 
     def refuse(constant: str) -> NoReturn:
         raise AssertionError(f"{command}: {constant} is not JSON")
 
-    check(command, json.loads(text, parse_constant=refuse))
+    for each in text.splitlines() if command in LINES else [text]:
+        check(command, json.loads(each, parse_constant=refuse))

@@ -2,9 +2,11 @@
 
 import time
 from collections.abc import Callable
+from contextlib import closing
 
 import pytest
 
+from hardwall.host.connect import connect, share
 from hardwall.host.errors import HostError
 from hardwall.host.heartbeat import LEASE_S
 from hardwall.host.panel.driver import Driver
@@ -285,3 +287,28 @@ def test_a_board_that_is_not_there_is_an_error_at_the_beginning():
 
     with pytest.raises(HostError, match="no"):
         Driver(fails)
+
+
+def test_beside_another_program_it_shows_whose_the_lease_is_and_may_disarm(board):
+    with share(board.name, answer_s=2.0) as relay, closing(Driver(lambda: connect(relay.name, answer_s=2.0))) as driver:
+        seen(driver, lambda view: view.lease == "")
+        with connect(relay.name, answer_s=2.0) as other:
+            other.set(wall_stiffness=500.0)
+            other.arm()
+            seen(driver, lambda view: view.lease == relay.holder != "" and view.status.state is State.ARMED)
+            # What the other one has written is shown, and what a tab wants is refused and not shown.
+            assert driver.view.values["wall_stiffness"] == other.get("wall_stiffness")
+            driver.set(TAB, "wall_stiffness", 900.0)
+            seen(driver, lambda view: "is held by" in view.said)
+            assert driver.view.values["wall_stiffness"] == other.get("wall_stiffness") < 600.0
+            driver.disarm()
+            seen(driver, lambda view: view.status.state is State.DISARMED)
+        seen(driver, lambda view: view.lease == "")
+        # What the tab's program read is older than what the other one wrote: it comes again.
+        driver.set(TAB, "wall_stiffness", 900.0)
+        seen(driver, lambda view: not view.connected)
+        assert "another program has written to the board" in driver.view.lost
+        driver.connect()
+        seen(driver, lambda view: view.connected)
+        driver.set(TAB, "wall_stiffness", 900.0)
+        seen(driver, lambda view: view.values["wall_stiffness"] > 800.0)

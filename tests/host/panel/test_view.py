@@ -41,6 +41,12 @@ def test_the_tab_that_armed_is_told_other_words_than_the_others():
     assert own["may"] == other["may"] == ["disarm"]
 
 
+@pytest.mark.parametrize(("lease", "who"), [("walk.py, process 7", "walk.py, process 7"), (None, "Another program")])
+def test_another_program_that_armed_is_named(lease, who):
+    view = replace(VIEW, status=replace(RESTS, state=State.ARMED), lease=lease)
+    assert told(view, "a")["do"] == f"{who} armed it. Here you may disarm."
+
+
 def test_a_board_that_rests_may_be_armed():
     now = told(VIEW, "a")
     assert (now["state"], now["may"], now["latched"]) == ("DISARMED", ["arm"], 0)

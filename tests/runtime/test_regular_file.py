@@ -6,7 +6,7 @@ import tracemalloc
 
 import pytest
 
-from hardwall.sim.jobs.regular_file import content_of
+from hardwall.model.runtime.regular_file import content_of
 
 
 def test_a_file_is_read_whole_up_to_its_bound(tmp_path):

@@ -1,0 +1,206 @@
+"""One owner of a board's port, and many programs at it: to each a port of the loopback is as the board itself."""
+
+import socket
+import threading
+import time
+from contextlib import suppress
+
+from ..model.axes.registers import BANK
+from ..model.link.board_pace import LOOPBACK, NETWORK
+from ..model.link.line import FRAME_MAX, FRAME_MIN, UNIT, crc, framed, length_of
+from ..model.link.server import DEVICE_IDENTIFICATION, DIAGNOSE, ECHO, IDENTIFY, WRITE_ONE, WRITES
+from .device import Device
+from .errors import HostError, PortError
+from .leases import LEASE_OBJECT, NAMED_OBJECT, NO_ANSWER, Guest, Lease, name_of
+from .port import Port
+
+GUESTS_MAX = 32
+"""The most programs at a board."""
+REST_S = 1.0
+"""The time behind which what was begun of a request is dropped: the loopback has no such pauses."""
+GRACE_S, BURST = 5e-3, 4
+"""The time for which the line is kept for the next request of the program that holds the lease, and for how many in a
+row: a beat is two, or four if one is lost. Behind a USB bridge another request in between would take 16 ms."""
+WRITE_MANY = 16
+CONFORMITY = 0x83
+"""The identification has objects of its own."""
+
+
+class Relay:
+    """Shares a port among programs. A context manager that ends it.
+
+    A request of the program that holds the lease goes before those of all others, and what follows it at once does, up
+    to `BURST` requests. So a beat waits for two requests of others at most, and others are not kept out.
+
+    What any program may do at any time is read, and disarm. Nothing is sent that no program has asked for: the board's
+    heartbeat is that of the program that holds the lease, and ends with it.
+
+    Args:
+        port: the board's port, which is closed at the end.
+        device: the board.
+        number: the port of the loopback; 0 for any that is free.
+
+    Attributes:
+        name: the port, as programs name it.
+        failure: why the board's port is gone; None while it is there.
+
+    Raises:
+        PortError: if that port of the loopback cannot be had.
+    """
+
+    def __init__(self, port: Port, device: Device, number: int = 0):
+        self._port, self._lease = port, Lease(lambda: port.pace)
+        disarm = device.registers["disarm"].address
+        self._disarms = {disarm + BANK * axis for axis in range(device.axes)}
+        try:
+            self._listener = socket.create_server((LOOPBACK, number))
+        except OSError as error:
+            raise PortError(f"port {number} of {LOOPBACK} cannot be had: {error.strerror}") from None
+        self.name = f"{NETWORK}{LOOPBACK}:{self._listener.getsockname()[1]}"
+        self.failure: HostError | None = None
+        # Whose turn it is: one request at a time, the holder's first; and how many wait, of the holder and of others.
+        self._turns = threading.Condition()
+        self._busy, self._waiting = False, {True: 0, False: 0}
+        # Until when the line is kept for the holder, and how many requests in a row it has had.
+        self._kept_s, self._in_a_row = 0.0, 0
+        self._connections: set[socket.socket] = set()
+        self._welcoming = threading.Thread(target=self._welcome, name="hardwall-relay", daemon=True)
+        self._welcoming.start()
+
+    def __enter__(self) -> "Relay":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Leave all programs, and close the board's port."""
+        with suppress(OSError):
+            self._listener.shutdown(socket.SHUT_RDWR)
+        self._listener.close()
+        for connection in list(self._connections):
+            with suppress(OSError):
+                connection.shutdown(socket.SHUT_RDWR)
+        self._port.close()
+
+    @property
+    def pace(self) -> float:
+        """The board's seconds in a second, or fewer."""
+        return self._port.pace
+
+    @property
+    def holder(self) -> str:
+        """The name of the program that holds the lease; empty if none does."""
+        with self._turns:
+            holder = self._lease.holder
+        return holder.name if holder else ""
+
+    def _welcome(self) -> None:
+        while True:
+            try:
+                connection, peer = self._listener.accept()
+            except OSError:
+                return
+            if len(self._connections) >= GUESTS_MAX:
+                connection.close()
+                continue
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._connections.add(connection)
+            threading.Thread(target=self._serve, args=(connection, peer), name="hardwall-guest", daemon=True).start()
+
+    def _serve(self, connection: socket.socket, peer: tuple[str, int]) -> None:
+        """Answer a program until it goes."""
+        name = name_of(peer)
+        with self._turns:
+            guest = self._lease.welcome(name)
+        try:
+            with connection, suppress(OSError):
+                begun = b""
+                while True:
+                    connection.settimeout(REST_S if begun else None)
+                    try:
+                        data = connection.recv(FRAME_MAX)
+                    except TimeoutError:
+                        begun = b""
+                        continue
+                    if not data:
+                        return
+                    begun += data
+                    while (size := _size_of(begun)) and len(begun) >= size:
+                        request, begun = begun[:size], begun[size:]
+                        if crc(request) or request[0] != UNIT:
+                            # As the board itself: silent to what is spoilt, or not for it.
+                            continue
+                        connection.sendall(framed(self._answer(guest, request[:-2])))
+        finally:
+            self._connections.discard(connection)
+            with self._turns:
+                self._lease.leave(guest)
+
+    def _answer(self, guest: Guest, request: bytes) -> bytes:
+        """Return the answer to a request, both without their CRC."""
+        function, data = request[1], request[2:]
+        if function == DIAGNOSE and data[:2] == ECHO.to_bytes(2, "big"):
+            return request
+        if function == IDENTIFY and data == bytes([DEVICE_IDENTIFICATION, NAMED_OBJECT, LEASE_OBJECT]):
+            name = self.holder.encode()[: FRAME_MAX // 2]
+            return request[:4] + bytes([CONFORMITY, 0, 0, 1, LEASE_OBJECT, len(name)]) + name
+        with self._turns:
+            self._wait_for_turn(self._lease.holder is guest)
+            if (refused := self._refusal(guest, request)) is not None:
+                self._turns.notify_all()
+                return bytes([UNIT, function | 0x80, refused])
+            self._busy = True
+        try:
+            return self._port.relay(request)
+        except HostError as error:
+            if isinstance(error, PortError):
+                self.failure = error
+            return bytes([UNIT, function | 0x80, NO_ANSWER])
+        finally:
+            with self._turns:
+                self._busy = False
+                if function in WRITES and not self._disarms_alone(request):
+                    self._lease.wrote(guest)
+                self._in_a_row = self._in_a_row + 1 if self._lease.holder is guest else 0
+                self._kept_s = time.monotonic() + (GRACE_S if 0 < self._in_a_row < BURST else 0.0)
+                self._turns.notify_all()
+
+    def _wait_for_turn(self, holds: bool) -> None:
+        """Wait, with the lock, until a request of the holder, or of another program, may go out."""
+        self._waiting[holds] += 1
+        while not self._may_go(holds):
+            # The end of a request wakes all; the time for which the line is kept ends by itself.
+            self._turns.wait(GRACE_S)
+        self._waiting[holds] -= 1
+
+    def _may_go(self, holds: bool) -> bool:
+        if self._busy:
+            return False
+        enough = self._in_a_row >= BURST
+        if holds:
+            return not (enough and self._waiting[False])
+        return enough or not (self._waiting[True] or time.monotonic() < self._kept_s)
+
+    def _refusal(self, guest: Guest, request: bytes) -> int | None:
+        """Return the exception that answers a request that is not carried to the board; None for one that is."""
+        if request[1] not in WRITES or self._disarms_alone(request):
+            return None
+        return self._lease.refusal(guest)
+
+    def _disarms_alone(self, request: bytes) -> bool:
+        """Return whether all that a request writes is the pulse that disarms an axis."""
+        place, count = (int.from_bytes(request[at : at + 2], "big") for at in (2, 4))
+        if request[1] not in (WRITE_ONE, WRITE_MANY):
+            return False
+        return place in self._disarms and count == 1 and request[-2:] == b"\0\1"
+
+
+def _size_of(begun: bytes) -> int | None:
+    """Return the bytes of a request by its beginning; of a function without a rule all that has come."""
+    if len(begun) < FRAME_MIN:
+        return None
+    known = length_of(begun)
+    if known is None and begun[1] not in WRITES:
+        return len(begun)
+    return min(known, FRAME_MAX) if known else None
