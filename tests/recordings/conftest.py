@@ -2,7 +2,8 @@
 
 import pytest
 
-from hardwall.sim.estimates.recording import RecordingError, load
+from hardwall.sim.recordings.error import RecordingError
+from hardwall.sim.recordings.load import load
 
 
 @pytest.fixture

@@ -4,6 +4,10 @@ from ...model.checks import shown
 
 NAME_MAX = 200
 """The most characters of the name of a column or of a file in a message."""
+ACCEPTED = (
+    "a CSV file: UTF-8 text, a header line with the columns' names, one sample a line; or a file of NumPy, MATLAB or "
+    "Parquet; or an edge capture as .sr, .vcd or CSV"
+)
 
 
 class RecordingError(ValueError):
