@@ -3,9 +3,10 @@
 The clock of the axis is as fast as the ticks of the capture, at most `CLOCK_MAX_HZ`, and fast enough for two edges
 never to fall into one clock. So a stamp of an edge is as fine as the capture has it.
 
-The reference. At an edge the position is known to a tick: it is the place of the edge on the scale. The position at a
-sample is that on the straight line through the edges on either side. Its derivative is filtered forward and backward as
-that of sampled counts is (`reference`).
+The reference. At an edge the position is known to a tick: it is the place of the edge on the scale. A cubic curve goes
+from edge to edge, with the slope of a parabola through each edge and those beside it. The curve is monotone between two
+places; where the motion turns, between two edges at one place, it rises by a count at most, as the motion does. Its
+derivative is filtered forward and backward as that of sampled counts is (`reference`).
 """
 
 import time
@@ -13,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import scipy
 
 from ...model.spec import AxisSpec
 from ...model.stamped import Edges
@@ -25,6 +27,11 @@ from .through_pins import DECODER_CLOCKS
 
 CLOCK_MAX_HZ = 100e6
 """The fastest clock of a replay; edges that are closer are a fault of the recording, not a motion."""
+
+STEEPEST = 3.0
+"""The steepest slope of a monotone cubic at its end, in slopes of its chord."""
+HIGHEST = 4.0
+"""The slope times the time at which a cubic between two equal places rises by a count."""
 
 
 def coarse(edges: EdgeRecord, coarsen: int) -> EdgeRecord:
@@ -53,11 +60,23 @@ def with_clock(spec: AxisSpec, edges: EdgeRecord, rate_hz: float) -> AxisSpec:
 
 
 def position_counts(edges: EdgeRecord, rate_hz: float, samples: int) -> np.ndarray:
-    """Return the position at every sample, counts, by straight lines from edge to edge."""
-    if not len(edges.ticks):
-        return np.full(samples, float(edges.start))
+    """Return the position at every sample, counts, by a curve from edge to edge."""
+    if len(edges.ticks) < 2:
+        return np.full(samples, float(edges.counts[-1] if len(edges.ticks) else edges.start))
     down = np.diff(edges.counts, prepend=edges.start) < 0
-    return np.interp(np.arange(samples) / rate_hz, edges.ticks / edges.tick_hz, edges.counts + down)
+    times_s, places = edges.ticks / edges.tick_hz, (edges.counts + down).astype(np.float64)
+    curve = scipy.interpolate.CubicHermiteSpline(times_s, places, _slopes(times_s, places))
+    return curve(np.clip(np.arange(samples) / rate_hz, times_s[0], times_s[-1]))
+
+
+def _slopes(times_s: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return the slope of the curve at every edge, counts/s: of the parabola through the edge and those beside it, but
+    no steeper than keeps the curve monotone between two places, and within a count where the motion turns."""
+    apart_s = np.diff(times_s)
+    between = np.diff(places) / apart_s
+    steepest = np.where(between == 0, HIGHEST / apart_s, STEEPEST * np.abs(between))
+    limit = np.minimum(np.append(steepest, np.inf), np.insert(steepest, 0, np.inf))
+    return np.clip(np.gradient(places, times_s), -limit, limit)
 
 
 def run_edges(

@@ -16,7 +16,7 @@ from .forms import source_of
 from .logic_text import LogicTable
 from .recording import RATE_MAX_HZ, RATE_MIN_HZ, SAMPLES_MAX, Reading, Recording
 from .stamps import UNITS, Stamps, Times
-from .steps import COUNTER_BITS, Steps
+from .steps import COUNTER_BITS, Steps, Unwrapped
 from .table import Table
 from .time_column import TIME_COLUMN, TimeColumn, place_of, time_column_of, unit_by_rate
 from .times import Sampled, check_mean
@@ -89,21 +89,21 @@ class _Counted:
         if stamps is not None:
             times, unit = self._seconds(stamps)
             grid = gaps.grid_of(table.name, times.since, counts, reading.gaps)
-        steps = self._steps(lines, counts, grid)
-        unwrapped = steps.unwrapped(reading.counter_bits, reading.gaps != "refuse")
+        # A lost sample is an uneven time and a jump of the count: the time says which it is.
+        rate_hz, start_s = self._rate(lines, grid, times)
+        unwrapped = self._unwrapped(lines, counts, grid)
         if reading.gaps == "split" and len(unwrapped.cuts):
             grid = gaps.piece(grid, unwrapped.cuts)
-            unwrapped = self._steps(lines, counts, grid).unwrapped(reading.counter_bits, True)
-        if len(grid.rows) < 2:
-            raise RecordingError(f"{table.name}: must have at least 2 samples between gaps, not {len(grid.rows)}")
-        rate_hz, start_s = self._rate(lines, grid, times)
+            rate_hz, start_s = self._rate(lines, grid, times)
+            unwrapped = self._unwrapped(lines, counts, grid)
         counts = gaps.held(unwrapped.counts, grid.numbers)
         notes = [table.form, *said, *self._said(rate_hz, unit), *unwrapped.notes, *grid.notes]
         column = table.called(self._place)
         return Recording(self._path, column, counts, rate_hz, start_s, notes=tuple(notes))
 
-    def _steps(self, lines: np.ndarray, counts: np.ndarray, grid: gaps.Grid) -> Steps:
-        return Steps(self._table, self._column, lines[grid.rows], counts[grid.rows], grid.gaps)
+    def _unwrapped(self, lines: np.ndarray, counts: np.ndarray, grid: gaps.Grid) -> Unwrapped:
+        steps = Steps(self._table, self._column, lines[grid.rows], counts[grid.rows], grid.gaps)
+        return steps.unwrapped(self._reading.counter_bits, self._reading.gaps != "refuse")
 
     def _read(self) -> tuple[np.ndarray, Counts, Stamps | None]:
         """Return the lines, the counts and the times of all rows."""
@@ -156,6 +156,8 @@ class _Counted:
 
     def _rate(self, lines: np.ndarray, grid: gaps.Grid, times: Times | None) -> tuple[float, float]:
         """Return the sample rate, and the time of the first sample."""
+        if len(grid.rows) < 2:
+            raise RecordingError(f"{self._table.name}: must have at least 2 samples between gaps, not {len(grid.rows)}")
         if times is None:
             return float(self._given), 0.0
         kept = times.some(grid.rows)

@@ -1,7 +1,8 @@
 """The times of samples as a file gives them, exactly: decimal numbers, the float64 of an array, or ISO timestamps.
 
 A decimal time is kept as a whole number and a power of ten, so differences of times have no rounding but their last.
-A text of 17 or more digits is a float64 that was printed in full; it counts as the shortest decimal of that float64.
+A text of 17 or more digits that is the value of a float64, rounded, was printed in full; it counts as the shortest
+decimal of that float64. Other texts keep all the digits that int64 holds.
 """
 
 import math
@@ -22,7 +23,7 @@ UNITS = {"s": 0, "ms": -3, "us": -6, "ns": -9}
 """The units of times, as powers of ten of a second."""
 TIME_MAX_S = 1e12
 """The largest time stamp, either way: tens of thousands of years."""
-DIGITS_MAX, DIGITS_OF_FLOAT = 18, 17
+DIGITS_MAX, DIGITS_OF_FLOAT = 19, 17
 """The most digits of a whole number in int64, and those that tell every float64 apart."""
 LEAST_POWER = -400
 """The least power of ten of a time: what is smaller is 0, as in float64."""
@@ -36,10 +37,20 @@ def decimal_of(text: str) -> Decimal | None:
         return None
 
 
+def _shortest(number: Decimal) -> Decimal:
+    """Return the shortest decimal of the float64 that a number is in full; the number itself if it is none."""
+    _, digits, power = number.as_tuple()
+    if len(digits) < DIGITS_OF_FLOAT or power >= 0:
+        return number
+    value = float(number)
+    off = abs(Context(60).subtract(Decimal(value), number))
+    return Decimal(repr(value)) if off <= Decimal(1).scaleb(power) else number
+
+
 def _alike(cells: list[str]) -> tuple[np.ndarray | None, int]:
     """Return the whole numbers and the power of ten of texts that all have as many decimals; (None, 0) for others."""
     joined, (_, point, decimals) = "\n".join(cells), cells[0].partition(".")
-    whole = DIGITS_OF_FLOAT - 1 - len(decimals)
+    whole = (DIGITS_OF_FLOAT if point else DIGITS_MAX) - 1 - len(decimals)
     if whole < 1 or joined.count("\n") >= len(cells) or not joined.isascii():
         return None, 0
     form = rf"[+-]?\d{{1,{whole}}}" + (rf"\.\d{{{len(decimals)}}}" if point else "")
@@ -117,12 +128,14 @@ class Stamps:
         number = decimal_of(text)
         if number is None or not number.is_finite() or not abs(number) <= self._most:
             return None
-        if len(number.as_tuple().digits) >= DIGITS_OF_FLOAT:
-            number = Decimal(repr(float(number)))
+        number = _shortest(number)
         if number.adjusted() < LEAST_POWER:
             return 0, max(int(number.as_tuple().exponent), LEAST_POWER)
         sign, digits, power = Context(DIGITS_MAX, ROUND_HALF_EVEN).plus(number).as_tuple()
         whole = int("".join(map(str, digits)))
+        if whole >> 62:
+            sign, digits, power = Context(DIGITS_MAX - 1, ROUND_HALF_EVEN).plus(number).as_tuple()
+            whole = int("".join(map(str, digits)))
         if power > 0:
             whole, power = whole * 10**power, 0
         return (-whole if sign else whole), power
