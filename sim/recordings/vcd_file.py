@@ -56,8 +56,10 @@ class Vcd(Capture):
         return name if name not in self.channels else ".".join([*scopes, name])
 
     def _tokens(self):
-        from vcd.reader import VCDParseError, tokenize  # noqa: PLC0415  (it comes with an extra)
-
+        try:
+            from vcd.reader import VCDParseError, tokenize  # noqa: PLC0415  (it comes with an extra)
+        except ModuleNotFoundError:
+            raise ModuleNotFoundError("nothing reads VCD", name="pyvcd") from None
         try:
             with opened(self._path) as file:
                 yield from tokenize(file)

@@ -51,4 +51,4 @@ def test_without_the_extra_its_module_is_named(read, monkeypatch):
     monkeypatch.setitem(sys.modules, "vcd.reader", None)
     with pytest.raises(ModuleNotFoundError) as error:
         read(vcd(), None, 1000.0, file="spindle.vcd")
-    assert error.value.name == "vcd.reader"
+    assert error.value.name == "pyvcd"
