@@ -1,4 +1,4 @@
-"""Files that hold arrays: NumPy's NPZ and NPY, MATLAB's MAT, and Parquet, each as a table.
+"""Files that hold arrays: NumPy's NPZ and NPY, and MATLAB's MAT, each as a table.
 
 Every one-dimensional array is a column by its name. A two-dimensional array `x` has the columns `x.1`, `x.2` and so on,
 along its shorter side. The members of a structure `s` are `s.member`. A structure `s` of Simulink, with its times and
@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .error import RecordingError, plain
+from .error import RecordingError
 from .table import Arrays
 
 BYTES_MAX = 2 * 10**9
@@ -79,28 +79,6 @@ def matlab_table(name: str, path: str | Path) -> Arrays:
         raise RecordingError(f"{name}: cannot be read as a MATLAB file ({error})") from None
     kept = {key: value for key, value in found.items() if not key.startswith("__")}
     return table_of(name, "MATLAB arrays", kept)
-
-
-def parquet_table(name: str, path: str | Path) -> Arrays:
-    """Return the table of a Parquet file.
-
-    Raises:
-        ModuleNotFoundError: without the extra `data`.
-        RecordingError: if it cannot be read, or has no column.
-    """
-    import polars  # noqa: PLC0415  (it comes with an extra)
-
-    check_size(name, Path(path).stat().st_size)
-    try:
-        frame = polars.read_parquet(path)
-    except polars.exceptions.PolarsError as error:
-        raise RecordingError(f"{name}: cannot be read as Parquet ({str(error).splitlines()[0]})") from None
-    for column in frame.get_columns():
-        if column.null_count():
-            row = column.is_null().arg_max() + 1
-            if column.dtype.is_numeric():
-                raise RecordingError(f"{name}, row {row}, column {plain(column.name)}: must have a value, not null")
-    return table_of(name, "Parquet", {column.name: column.to_numpy() for column in frame.get_columns()})
 
 
 def table_of(name: str, form: str, found: dict[str, object]) -> Arrays:

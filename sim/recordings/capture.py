@@ -47,11 +47,13 @@ class Capture(ABC):
         name: the file, for messages.
         form: the form of the file, in a few words.
         channels: names of the channels.
+        otherwise: what to do if the file is no capture, for the end of a message.
     """
 
     name: str
     form: str
     channels: list[str]
+    otherwise: str = ""
 
     @abstractmethod
     def changes(self, places: Sequence[int]) -> Changes:
@@ -81,6 +83,7 @@ class Capture(ABC):
             return [0, 1]
         raise RecordingError(
             f"{self.name}: the channels A and B must be given (--channels A,B), two or with Z three of {self._names()}"
+            f"{self.otherwise}"
         )
 
     def _place(self, channel: str) -> int:

@@ -66,11 +66,17 @@ def edges_of(name: str, changes: Changes) -> EdgeRecord:
     """Return the edges of A and B, counted from 0.
 
     Raises:
-        RecordingError: if both change at once.
+        RecordingError: if both change at once, or the times do not increase.
     """
     pins = np.concatenate([[changes.start], changes.levels]) & 3
     moved = np.diff(pins) != 0
     ticks, pins = changes.ticks[moved], np.concatenate([pins[:1], pins[1:][moved]])
+    if (np.diff(changes.ticks, prepend=-1) <= 0).any():
+        place = int(np.argmax(np.diff(changes.ticks, prepend=-1) <= 0))
+        raise RecordingError(
+            f"{name}: times must increase from one change of levels to the next, not go to "
+            f"{changes.ticks[place] / changes.tick_hz:g} s after the first sample at change {place + 1}"
+        )
     both = np.flatnonzero((pins[1:] ^ pins[:-1]) == 3)
     if len(both):
         raise RecordingError(

@@ -5,9 +5,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..jobs.regular_file import opened
-from .arrays import matlab_table, npy_table, numpy_table, parquet_table
+from .arrays import matlab_table, npy_table, numpy_table
 from .capture import Capture
 from .error import ACCEPTED, RecordingError
+from .parquet import Parquet
 from .sigrok import Sigrok
 from .table import Table
 from .text import Text
@@ -62,6 +63,6 @@ FORMS: dict[bytes, Callable[[str, str | Path], Table | Capture]] = {
     b"\x93NUMPY": npy_table,
     b"MATLAB 5": matlab_table,
     b"MATLAB 7": matlab_table,
-    b"PAR1": parquet_table,
+    b"PAR1": Parquet,
 }
 """What reads a file, by how it begins."""

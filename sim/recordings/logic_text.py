@@ -29,12 +29,16 @@ class LogicTable(Capture):
         RecordingError: if it has neither times nor a rate.
     """
 
+    otherwise = "; for counts, name their column (--column)"
+
     def __init__(self, table: Table, reading: Reading):
         self.name, self.form, self._table = table.name, f"levels as {table.form}", table
         named = [table.place(each) for each in reading.channels if each in table.names]
         self._time = time_column_of(table, reading, set(named))
         if self._time is None and table.rate_hz is None:
-            raise RecordingError(f"{table.name}: a capture must have times (--time COLUMN), or state its sample rate")
+            raise RecordingError(
+                f"{table.name}: a capture must have times (--time COLUMN), or state its sample rate{self.otherwise}"
+            )
         self._places = [place for place in range(table.width) if self._time is None or place != self._time.place]
         self.channels = [table.called(place) for place in self._places]
 
@@ -82,8 +86,7 @@ class LogicTable(Capture):
                 place = int(np.argmin(valid))
                 raise RecordingError(
                     f"{self._table.at(lines[place])}, column {plain(self._table.called(places[bit]))}: a level must "
-                    f"be 0 or 1, not {str(texts[place])[:20]!r}: name the channels (--channels), or a column of counts "
-                    "(--column)"
+                    f"be 0 or 1, not {str(texts[place])[:20]!r}: name the channels (--channels){self.otherwise}"
                 )
             now |= high.astype(np.int8) << np.int8(bit)
         return now

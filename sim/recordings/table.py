@@ -107,10 +107,10 @@ class Arrays(Table):
             said = " and ".join(f"{plain(self.called(place))} {len(self._columns[place])}" for place in places)
             raise RecordingError(f"{self.name}: columns must have as many rows as each other, not {said}")
         for first in range(0, *lengths, CHUNK):
-            columns: list[Cells] = [_of_numbers(column[first : first + CHUNK]) for column in wanted]
+            columns: list[Cells] = [of_numbers(column[first : first + CHUNK]) for column in wanted]
             yield Chunk(range(first + 1, first + 1 + len(columns[0])), columns)
 
 
-def _of_numbers(values: np.ndarray) -> Cells:
+def of_numbers(values: np.ndarray) -> Cells:
     """Return numbers and times as they are, and everything else as texts."""
     return values if values.dtype.kind in "iufbM" else [str(value) for value in values.tolist()]

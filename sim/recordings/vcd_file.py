@@ -3,7 +3,7 @@
 A capture begins where all its channels have levels; later, a level must be 0 or 1.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -15,6 +15,10 @@ from .error import RecordingError
 
 _UNITS_S = {"s": 1, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "ps": 1e-12, "fs": 1e-15}
 _LEVELS = {"0": 0, "1": 1}
+_SCALARS = "01xXzZ"
+PIECE = 1 << 20
+TICK_DIGITS = 18
+"""The most digits of a time, with its mark: more do not fit int64."""
 
 
 class Vcd(Capture):
@@ -56,6 +60,7 @@ class Vcd(Capture):
         return name if name not in self.channels else ".".join([*scopes, name])
 
     def _tokens(self):
+        """Yield the tokens of the file. Its declarations are read so; its changes are too many for tokens."""
         try:
             from vcd.reader import VCDParseError, tokenize  # noqa: PLC0415  (it comes with an extra)
         except ModuleNotFoundError:
@@ -73,23 +78,21 @@ class Vcd(Capture):
         level: list[int | None] = [None] * len(places)
         found: list[tuple[int, int]] = []
         now = 0
-        for token in self._tokens():
-            kind = token.kind.name
-            if kind == "CHANGE_TIME":
-                now = token.data
-            elif kind == "CHANGE_SCALAR" and token.scalar_change.id_code in bits:
-                value = token.scalar_change.value
-                if value not in _LEVELS and None not in level:
-                    at = f"{self.name}, line {token.span.start.line}"
-                    raise RecordingError(f"{at}: a level must be 0 or 1 once all are known, not {value!r}")
-                for bit in bits[token.scalar_change.id_code]:
-                    level[bit] = _LEVELS.get(value)
+        for word in self._words():
+            if word[0] == "#":
+                now = self._time(word)
+            elif word[1:] in bits and word[0] in _SCALARS:
+                if word[0] not in _LEVELS and None not in level:
+                    raise RecordingError(
+                        f"{self.name}, at #{now}: a level must be 0 or 1 once all are known, not {word[0]!r}"
+                    )
+                for bit in bits[word[1:]]:
+                    level[bit] = _LEVELS.get(word[0])
                 if None not in level:
-                    word = sum(each << bit for bit, each in enumerate(level))
                     # Of several changes at one time, the last levels count.
                     if found and found[-1][0] == now:
                         found.pop()
-                    found.append((now, word))
+                    found.append((now, sum(each << bit for bit, each in enumerate(level))))
                     self.check_number(len(found))
         if not found:
             raise RecordingError(f"{self.name}: its channels have no levels")
@@ -97,3 +100,32 @@ class Vcd(Capture):
         kept = [after for before, after in pairwise(found) if after[1] != before[1]]
         ticks, levels = (np.array([each[place] for each in kept], np.int64) for place in (0, 1))
         return Changes(self._tick_hz, ticks - first, levels, start, max(now - first, 1), first / self._tick_hz)
+
+    def _time(self, word: str) -> int:
+        if not word[1:].isdigit() or len(word) > TICK_DIGITS:
+            raise RecordingError(
+                f"{self.name}: a time must be a number of at most {TICK_DIGITS} digits, not {word[:40]!r}"
+            )
+        return int(word[1:])
+
+    def _words(self) -> Iterator[str]:
+        """Yield the words of the changes that are times or scalars; without comments, and the values of vectors."""
+        declared = remark = skip = False
+        for word in self._all_words():
+            if skip or remark or not declared:
+                declared = declared or word == "$enddefinitions"
+                remark, skip = remark and word != "$end", False
+            elif word[0] in "bBrRsS":
+                skip = True
+            elif word[0] != "$":
+                yield word
+            else:
+                remark = word == "$comment"
+
+    def _all_words(self) -> Iterator[str]:
+        rest = ""
+        with opened(self._path) as file:
+            while block := file.read(PIECE):
+                head, _, rest = (rest + block.decode("ascii", "replace")).rpartition("\n")
+                yield from head.split()
+        yield from rest.split()

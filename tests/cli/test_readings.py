@@ -1,6 +1,7 @@
 """The options of a recording, as `replay` and `accuracy` are called with them; what was understood is said."""
 
 import json
+import sys
 
 import pytest
 
@@ -81,7 +82,10 @@ def test_accuracy_takes_a_column_in_other_units(monkeypatch, capsys, folder, fre
         (["--column", "angle", "--gaps", "fill"], "--gaps must be "),
         (["--column", "angle", "--counter-bits", "7"], "--counter-bits must be "),
         (["--channels", "A"], "--channels must be two or three names or numbers, A,B or A,B,Z, not 'A'"),
-        (["--channels", "A,B", "--rate", "1", "--time", "Zeit"], "a channel must be one of angle, or a number of 1 to 1, not 'A'"),
+        (
+            ["--channels", "A,B", "--rate", "1", "--time", "Zeit"],
+            "a channel must be one of angle, or a number of 1 to 1, not 'A'",
+        ),
         (
             ["--set", "gains.x=1", "--column", "angle"],
             "--set 'gains.x' is not a key of a replay with levant, which has",
@@ -96,7 +100,7 @@ def test_options_that_are_refused(monkeypatch, capsys, folder, words, said):
 
 def test_without_the_extra_a_file_that_needs_it_names_it(monkeypatch, capsys, folder):
     (folder / "log.parquet").write_bytes(b"PAR1" + bytes(50))
-    monkeypatch.setitem(__import__("sys").modules, "polars", None)
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
     code, out, err = call(monkeypatch, capsys, "replay", "log.parquet", "--column", "x")
     assert (code, out) == (1, "")
-    assert err == "hardwall: error: polars is not installed: it comes with pip install 'hardwall[data]'\n"
+    assert err == "hardwall: error: pyarrow.parquet is not installed: it comes with pip install 'hardwall[data]'\n"

@@ -65,6 +65,13 @@ def test_both_channels_at_once_are_refused():
         edges_of("made", changes)
 
 
+@pytest.mark.parametrize("ticks", [[100, 200, 150], [100, 200, 200], [-5, 200, 300]])
+def test_times_that_do_not_increase_are_refused(ticks):
+    changes = Changes(1e6, np.array(ticks), np.array([1, 3, 2]), 0, 1000)
+    with pytest.raises(RecordingError, match=r"^made: times must increase from one change of levels to the next, not"):
+        edges_of("made", changes)
+
+
 def test_an_edge_at_the_time_of_a_sample_is_counted_there():
     found = EdgeRecord(1e6, np.array([1000, 1001, 3000]), np.array([1, 2, 3]), 0)
     assert counts_at(found, 1000.0, 5).tolist() == [0, 1, 2, 3, 3]

@@ -26,12 +26,26 @@ def test_files_that_are_refused(refused, old, new, said):
     assert said in refused(text, None, 1000.0, file="spindle.vcd")
 
 
-def test_a_level_that_is_lost_is_refused_by_its_line(refused):
-    lines = vcd().splitlines()
-    place = lines.index("1!")
-    lines[place] = "x!"
-    said = f"line {place + 1}: a level must be 0 or 1 once all are known, not 'x'"
-    assert said in refused("\n".join(lines), None, 1000.0, file="spindle.vcd")
+def test_a_level_that_is_lost_is_refused_by_its_time(refused):
+    text = vcd()
+    first = f"#{edges()[0][0] + 100}"
+    said = f"at {first}: a level must be 0 or 1 once all are known, not 'x'"
+    assert said in refused(text.replace(f"{first}\n1!", f"{first}\nx!"), None, 1000.0, file="spindle.vcd")
+
+
+@pytest.mark.parametrize("time", ["#x", "#-1", f"#{10**30}", "#"])
+def test_times_that_are_none_are_refused(refused, time):
+    text = vcd() + f"{time}\n1!\n"
+    assert "a time must be a number of at most 18 digits, not" in refused(text, None, 1000.0, file="spindle.vcd")
+
+
+def test_comments_vectors_and_blocks_are_no_changes(read):
+    """A word of a comment, or the code of a vector, may look like a change."""
+    plain = read(vcd(), None, 1000.0, file="spindle.vcd")
+    noise = "$comment 1! 0# #5 $end b1 ! r0.5 # $dumpvars $end\n"
+    first = f"#{edges()[0][5] + 100}\n"
+    found = read(vcd().replace(first, first + noise), None, 1000.0, file="spindle.vcd")
+    assert found.content == plain.content
 
 
 def test_wires_of_one_name_have_their_scopes(tmp_path):
