@@ -1,4 +1,4 @@
-"""Files that hold arrays: NumPy's NPZ and NPY, and MATLAB's MAT, each as a table.
+"""Named arrays as a table, and the files of NumPy that hold them, NPZ and NPY.
 
 Every one-dimensional array is a column by its name. A two-dimensional array `x` has the columns `x.1`, `x.2` and so on,
 along its shorter side. The members of a structure `s` are `s.member`. A structure `s` of Simulink, with its times and
@@ -7,11 +7,12 @@ one signal, has the columns `s` and `s.time`.
 
 import zipfile
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
-from .error import RecordingError
+from .error import RecordingError, readable
 from .table import Arrays
 
 BYTES_MAX = 2 * 10**9
@@ -31,14 +32,10 @@ def numpy_table(name: str, path: str | Path) -> Arrays:
     Raises:
         RecordingError: if it cannot be read, or has no column.
     """
-    try:
+    with readable(name, "NumPy arrays"):
         _check_members(name, path)
         with np.load(path, allow_pickle=False) as file:
             return table_of(name, "NumPy arrays", {key: file[key] for key in file.files})
-    except (ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
-        if isinstance(error, RecordingError):
-            raise
-        raise RecordingError(f"{name}: cannot be read as NumPy arrays ({error})") from None
 
 
 def _check_members(name: str, path: str | Path) -> None:
@@ -48,11 +45,9 @@ def _check_members(name: str, path: str | Path) -> None:
 
 def npy_table(name: str, path: str | Path) -> Arrays:
     """Return the table of an NPY file, whose columns have numbers, or the names of its fields."""
-    try:
+    with readable(name, "a NumPy array"):
         array = np.load(path, mmap_mode="r", allow_pickle=False)
         check_size(name, array.nbytes)
-    except (ValueError, EOFError) as error:
-        raise RecordingError(f"{name}: cannot be read as a NumPy array ({error})") from None
     if array.dtype.names:
         return table_of(name, "a NumPy array", {key: np.array(array[key]) for key in array.dtype.names})
     flat = np.array(array)
@@ -60,41 +55,22 @@ def npy_table(name: str, path: str | Path) -> Arrays:
     return Arrays(name, "a NumPy array", {str(place + 1): column for place, column in enumerate(columns)}, names=False)
 
 
-def matlab_table(name: str, path: str | Path) -> Arrays:
-    """Return the table of a MAT file of version 4 to 7.
-
-    Raises:
-        RecordingError: if it cannot be read, or has no column.
-    """
-    import scipy.io  # noqa: PLC0415  (most files are of another form)
-
-    check_size(name, Path(path).stat().st_size)
-    try:
-        found = scipy.io.loadmat(str(path), struct_as_record=False, squeeze_me=True)
-    except NotImplementedError:
-        raise RecordingError(
-            f"{name}: is a MATLAB file of version 7.3, which is HDF5: save it with -v7, or as CSV"
-        ) from None
-    except Exception as error:  # what a damaged file raises is of many kinds
-        raise RecordingError(f"{name}: cannot be read as a MATLAB file ({error})") from None
-    kept = {key: value for key, value in found.items() if not key.startswith("__")}
-    return table_of(name, "MATLAB arrays", kept)
-
-
 def table_of(name: str, form: str, found: dict[str, object]) -> Arrays:
-    """Return the table of named values, of which those that are arrays of numbers, times or texts are columns.
+    """Return the table of named values: see `columns_of`.
 
     Raises:
-        RecordingError: if there is none.
+        RecordingError: if it has no column.
     """
-    columns = {}
-    for key, value in found.items():
-        for called, column in _columns(key, value):
-            if len(columns) < COLUMNS_MAX:
-                columns[called] = column
+    columns = columns_of(found)
     if not columns:
         raise RecordingError(f"{name}: has no array of numbers, one value a sample")
     return Arrays(name, form, columns)
+
+
+def columns_of(found: dict[str, object]) -> dict[str, np.ndarray]:
+    """Return the columns of named values, of which those that are arrays of numbers, times or texts have some."""
+    columns = (pair for key, value in found.items() for pair in _columns(key, value))
+    return dict(islice(columns, COLUMNS_MAX))
 
 
 def _columns(name: str, value: object) -> Iterator[tuple[str, np.ndarray]]:

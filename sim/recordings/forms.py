@@ -5,9 +5,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..jobs.regular_file import opened
-from .arrays import matlab_table, npy_table, numpy_table
+from .arrays import npy_table, numpy_table
 from .capture import Capture
-from .error import ACCEPTED, RecordingError
+from .error import ACCEPTED, RecordingError, readable
+from .matlab import matlab_table
 from .parquet import Parquet
 from .sigrok import Sigrok
 from .table import Table
@@ -44,11 +45,8 @@ def source_of(name: str, path: str | Path, progress: Callable[[int], None] | Non
 
 
 def _of_zip(name: str, path: str | Path) -> Table | Capture:
-    try:
-        with zipfile.ZipFile(path) as archive:
-            members = archive.namelist()
-    except zipfile.BadZipFile as error:
-        raise RecordingError(f"{name}: is a damaged ZIP ({error}); must be {ACCEPTED}") from None
+    with readable(name, "a ZIP"), zipfile.ZipFile(path) as archive:
+        members = archive.namelist()
     if "metadata" in members:
         return Sigrok(name, path)
     if members and all(member.endswith(".npy") for member in members):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .error import RecordingError, plain
+from .error import RecordingError, plain, readable
 from .table import CHUNK, Chunk, Table, of_numbers
 
 
@@ -27,33 +27,22 @@ class Parquet(Table):
         import pyarrow.parquet  # noqa: PLC0415  (it comes with an extra)
 
         self.name = self.head = name
-        # What a damaged file raises is an OSError, a ValueError or a RuntimeError.
-        self._wrong = OSError, ValueError, RuntimeError
-        try:
+        with readable(name, self.form):
             self._file = pyarrow.parquet.ParquetFile(path)
             self.names = list(self._file.schema_arrow.names)
-        except self._wrong as error:
-            raise self._damaged(error) from None
         self.width = len(self.names)
         if not self.names:
             raise RecordingError(f"{name}: has no columns")
-
-    def _damaged(self, error: Exception) -> RecordingError:
-        return RecordingError(f"{self.name}: cannot be read as Parquet ({(str(error) or 'damaged').splitlines()[0]})")
 
     def chunks(self, places: Sequence[int]) -> Iterator[Chunk]:
         wanted, first = [self.names[place] for place in places], 1
         batches = self._file.iter_batches(CHUNK, columns=wanted)
         while True:
-            try:
+            with readable(self.name, self.form):
                 batch = next(batches, None)
-                columns = None if batch is None else [self._numbers(batch.column(name), name, first) for name in wanted]
-            except RecordingError:
-                raise
-            except self._wrong as error:
-                raise self._damaged(error) from None
-            if batch is None:
-                return
+                if batch is None:
+                    return
+                columns = [self._numbers(batch.column(name), name, first) for name in wanted]
             yield Chunk(range(first, first + batch.num_rows), columns)
             first += batch.num_rows
 

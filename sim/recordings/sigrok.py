@@ -8,14 +8,13 @@ The metadata is an INI file. Its section of a device has `capturefile`, `sampler
 import configparser
 import re
 import zipfile
-import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from .capture import Capture, Changes, changed, hertz_of
-from .error import RecordingError
+from .error import RecordingError, readable
 
 PIECE = 1 << 20
 UNIT_MAX = 8
@@ -53,10 +52,11 @@ class Sigrok(Capture):
     def _device(self) -> dict[str, str]:
         """Return the section of the first device with logic channels."""
         config = configparser.ConfigParser(interpolation=None, strict=False)
+        with readable(self.name, "a session of sigrok"), zipfile.ZipFile(self._path) as archive:
+            text = archive.read("metadata")[:METADATA_MAX].decode()
         try:
-            with zipfile.ZipFile(self._path) as archive, archive.open("metadata") as file:
-                config.read_string(file.read(METADATA_MAX).decode())
-        except (configparser.Error, UnicodeDecodeError, KeyError, zipfile.BadZipFile, zlib.error):
+            config.read_string(text)
+        except configparser.Error:
             raise RecordingError(f"{self.name}: has no metadata of sigrok that can be read") from None
         for section in config.sections():
             if config.has_option(section, "capturefile"):
@@ -86,18 +86,15 @@ class Sigrok(Capture):
     def _samples(self) -> Iterator[np.ndarray]:
         """Yield the samples in pieces, as words."""
         rest = b""
-        try:
-            with zipfile.ZipFile(self._path) as archive:
-                for member in self._members(archive):
-                    with archive.open(member) as file:
-                        while piece := file.read(PIECE):
-                            piece = rest + piece
-                            whole = len(piece) // self._unit * self._unit
-                            rest = piece[whole:]
-                            if whole:
-                                yield self._words(piece[:whole])
-        except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
-            raise RecordingError(f"{self.name}: is damaged ({error}): copy the file again") from None
+        with readable(self.name, "a session of sigrok"), zipfile.ZipFile(self._path) as archive:
+            for member in self._members(archive):
+                with archive.open(member) as file:
+                    while piece := file.read(PIECE):
+                        piece = rest + piece
+                        whole = len(piece) // self._unit * self._unit
+                        rest = piece[whole:]
+                        if whole:
+                            yield self._words(piece[:whole])
 
     def _members(self, archive: zipfile.ZipFile) -> list[str]:
         numbered = {}

@@ -126,7 +126,7 @@ class Stamps:
     def _of_text(self, text: str) -> tuple[int, int] | None:
         """Return the whole number and the power of ten of a time; None if the text has none."""
         number = decimal_of(text)
-        if number is None or not number.is_finite() or not abs(number) <= self._most:
+        if number is None or not number.is_finite() or not number.copy_abs() <= self._most:
             return None
         number = _shortest(number)
         if number.adjusted() < LEAST_POWER:

@@ -32,8 +32,8 @@ def test_a_damaged_session_is_refused(refused):
     content = session()
     at = content.index(b"logic-1-1") + 60
     broken = content[:at] + bytes(20) + content[at + 20 :]
-    assert "is damaged (" in refused(broken, None, 1000.0, file="spindle.sr")
-    assert "is a damaged ZIP" in refused(content[: len(content) // 2], None, 1000.0, file="spindle.sr")
+    assert "cannot be read as a session of sigrok (" in refused(broken, None, 1000.0, file="spindle.sr")
+    assert "cannot be read as a ZIP (" in refused(content[: len(content) // 2], None, 1000.0, file="spindle.sr")
 
 
 def test_channels_are_bits_by_their_numbers(tmp_path):
