@@ -24,8 +24,10 @@ class Parquet(Table):
     word, form = "row", "Parquet"
 
     def __init__(self, name: str, path: str | Path):
-        import pyarrow.parquet  # noqa: PLC0415  (it comes with an extra)
-
+        try:
+            import pyarrow.parquet  # noqa: PLC0415  (it comes with an extra)
+        except ModuleNotFoundError:
+            raise ModuleNotFoundError("nothing reads Parquet", name="pyarrow") from None
         self.name = self.head = name
         with readable(name, self.form):
             self._file = pyarrow.parquet.ParquetFile(path)

@@ -58,4 +58,4 @@ def test_without_the_extra_its_module_is_named(read, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
     with pytest.raises(ModuleNotFoundError) as error:
         read(b"PAR1" + bytes(50), file="spindle.parquet")
-    assert error.value.name == "pyarrow.parquet"
+    assert error.value.name == "pyarrow"
