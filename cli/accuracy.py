@@ -1,5 +1,6 @@
 """The command `accuracy`."""
 
+import re
 from functools import partial
 from typing import Annotated, Any
 
@@ -7,14 +8,14 @@ import typer
 
 from ..sim.estimates import figures, signals
 from ..sim.estimates.accuracy import PHASE, errors_of
-from ..sim.estimates.recording import RecordingError
 from ..sim.estimates.replay import ReplayError
 from ..sim.jobs.store import Store
 from ..sim.studies import accuracy
 from .errors import BadInput
 from .options import BackendOption, EstimatorsOption, within
+from .readings import READING, ReadingOptions, say
 from .scenes import EncoderSetOption, curves_of, encoder_of, rates_of
-from .study import StudyOptions, study
+from .study import study
 
 ACCELERATIONS_M_PER_S2 = 1e-9, 1e6
 """The least and the largest bound C: one that shows after minutes, and one beyond any motor."""
@@ -22,14 +23,21 @@ DRAWN_HZ_MAX = 100_000
 """The highest rate at which Figure 1 is drawn, sample by sample."""
 
 
-@study("workers", "plot")
+FILE = re.compile(
+    r"(?P<file>.+?\.(?:csv|tsv|txt|dat|log|npz|npy|mat|parquet|pq|sr|vcd)(?:\.gz)?)(?::(?P<column>.*))?", re.IGNORECASE
+)
+"""A recording, by the suffix of its file, and its column, which may have colons."""
+
+
+@study("workers", "plot", *READING, kind=ReadingOptions)
 def command(
-    options: StudyOptions,
+    options: ReadingOptions,
     figure: Annotated[int | None, typer.Option(min=1, max=2, help="reproduce the founding paper's figure")] = None,
     signal: Annotated[
         list[str] | None,
         typer.Option(
-            help="paper, sweep, stop, flicker, hit, steady:MM_PER_S, or FILE.csv:COLUMN", show_default="paper"
+            help="paper, sweep, stop, flicker, hit, steady:MM_PER_S, FILE:COLUMN of a recording, or FILE of a capture",
+            show_default="paper",
         ),
     ] = None,
     wanted: EstimatorsOption = None,
@@ -70,9 +78,12 @@ def command(
     try:
         errors_of(encoder)
         motions = accuracy.jobs(curves, known, at, of_all)
-        result = accuracy.study(figure, curves, motions, recorded, backend, run)
-    except (ValueError, RecordingError, ReplayError) as error:
+        readings = [options.read(*each) for each in recorded]
+        result = accuracy.study(figure, curves, motions, readings, backend, run)
+    except (ValueError, ReplayError) as error:
         raise BadInput(str(error)) from None
+    for each in readings:
+        say(each)
     options.finish(result)
 
 
@@ -84,17 +95,16 @@ def _encoder(assignments: list[str] | None, phase_error_counts: float) -> dict[s
     return encoder | ({PHASE: phase_error_counts} if phase_error_counts else {})
 
 
-def _signals(names: list[str]) -> tuple[list[str], list[tuple[str, str]]]:
-    """Return the known motions, and (file, column) of every recording `FILE.csv:COLUMN`; a column may have a colon."""
+def _signals(names: list[str]) -> tuple[list[str], list[tuple[str, str | None]]]:
+    """Return the known motions, and (file, column) of every recording `FILE:COLUMN`, without a column of a capture."""
     known, recorded = [], []
     for name in names:
-        stem, colon, column = name.partition(".csv:")
-        if colon:
-            recorded.append((f"{stem}.csv", column))
+        if match := FILE.fullmatch(name):
+            recorded.append((match["file"], match["column"]))
             continue
         try:
             signals.load(name)
         except ValueError as error:
-            raise BadInput(f"--signal: {error}, or FILE.csv:COLUMN") from None
+            raise BadInput(f"--signal: {error}, or FILE:COLUMN, FILE with a suffix such as .csv") from None
         known.append(name)
     return known, recorded

@@ -5,23 +5,32 @@ from typing import Annotated
 
 import typer
 
-from ..sim.estimates import recording, replay
+from ..sim.estimates import replay
+from ..sim.estimates.settings import SettingError, settings_of
 from .errors import BadInput
 from .options import BackendOption, Estimator, OutputOption, output_file
-from .study import StudyOptions, study
+from .readings import READING, ReadingOptions, say
+from .study import study
 from .terminal import progress
 
-OPTIONS = {"output": "--output", "coarsen": "--coarsen", "acceleration_max_counts_per_s2": "--acceleration-max"}
+OPTIONS = {
+    "output": "--output",
+    "coarsen": "--coarsen",
+    "acceleration_max_counts_per_s2": "--acceleration-max",
+    "settings": "--set",
+}
 """The options that give the arguments of a replay, by the names of these."""
 
 
-@study("plot")
+@study("set_", "plot", *READING, kind=ReadingOptions)
 def command(
-    options: StudyOptions,
-    file: Annotated[Path, typer.Argument(metavar="FILE.csv", help="a recording, its first line the columns' names")],
-    column: Annotated[str, typer.Option(help="the column of encoder counts")],
-    rate: Annotated[
-        float | None, typer.Option(metavar="HZ", help="sample rate", show_default="from column time_s")
+    options: ReadingOptions,
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="a recording: CSV, NumPy, MATLAB, Parquet, sigrok or VCD")
+    ],
+    column: Annotated[
+        str | None,
+        typer.Option(help="the column of counts, by name or number", show_default="edges of a capture"),
     ] = None,
     coarsen: Annotated[
         int, typer.Option(min=1, max=replay.COARSEN_MAX, help="divide the counts, and judge against the full ones")
@@ -37,11 +46,16 @@ def command(
 ) -> None:
     out = output_file(out, "--out", (".csv",), other_than=file)
     try:
-        recorded = recording.load(file, column, rate)
+        settings = settings_of(options.changes(), estimator)
+    except SettingError as error:
+        raise BadInput(f"--set {error}") from None
+    recorded = options.read(file, column)
+    try:
         with progress(f"{file.name} {estimator} {backend}", len(recorded.counts)) as advance:
-            result = replay.replay(recorded, estimator, output, backend, coarsen, acceleration_max, progress=advance)
+            result = replay.replay(recorded, estimator, output, backend, coarsen, acceleration_max, advance, settings)
     except replay.ArgumentError as error:
         raise BadInput(f"{OPTIONS[error.argument]} {error.said}") from None
-    except (recording.RecordingError, replay.ReplayError) as error:
+    except replay.ReplayError as error:
         raise BadInput(str(error)) from None
+    say(recorded)
     options.finish(result, {"velocities": (out, result.save)} if out else {})

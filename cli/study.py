@@ -39,7 +39,9 @@ class StudyOptions(ReportOptions):
             return parallel.run(function, jobs, store, self.workers, advance)
 
 
-def study(*wanted: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+def study(
+    *wanted: str, kind: type[StudyOptions] = StudyOptions
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Return a decorator that makes a command of a function whose first argument is a `StudyOptions`: see `reports`."""
 
     def command_of(function: Callable[..., None]) -> Callable[..., None]:
@@ -49,6 +51,6 @@ def study(*wanted: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
                 termination.go_on_by("--resume goes on from there")
             function(options, **given)
 
-        return reports(*wanted, kind=StudyOptions)(begun)
+        return reports(*wanted, kind=kind)(begun)
 
     return command_of

@@ -24,6 +24,7 @@ FLOORS = (
     "rtl",
     "loop",
     "scene",
+    "recordings",
     "virtual",
     "walls",
     "estimates",
@@ -287,7 +288,7 @@ def test_what_is_imported_is_what_its_extra_installs(path):
     for_tests = path in TESTS or path.stem.startswith("cocotb_")
     room = path.relative_to(ROOT).parts[0]
     of_room = {"model": [], "host": ["host", "panel"], "cli": ["sim", "host"]}
-    extras = of_room.get(room, ["sim", "host", "panel", "test"] if for_tests else ["sim"])
+    extras = of_room.get(room, ["sim", "data", "host", "panel", "test"] if for_tests else ["sim", "data"])
     pinned = [CONFIG["project"]["dependencies"], *(EXTRAS[extra] for extra in extras)]
     installed = {plain(requirement.partition("==")[0]) for one in pinned for requirement in one}
     installed.add("llvmlite")  # a dependency of Numba

@@ -17,13 +17,13 @@ from ...model.estimators import registry
 from ...model.record_axis import GLITCH_CLOCKS
 from ...model.runtime.compiled import compiled
 from ...model.spec import AxisSpec
+from ..recordings.recording import Recording
 from ..scene.load import load
 from ..world.encoder import Errors, offsets
 from . import learning, signals
 from .judge import Judge
 from .motions import velocity
 from .playback import velocities
-from .recording import Recording
 from .replay import check_length, replay
 
 RATES_HZ = (1_000, 10_000_000)
@@ -239,8 +239,8 @@ def measure_recording(recorded: Recording, estimator: str, output: str, backend:
     """Return one row of a recording at its own rate, its counts `COARSEN` times coarser, in recorded counts.
 
     The file does not give the size of a count in mm, so the keys of the figures end in `_counts_s`. The reference is
-    the zero-phase derivative of the full counts. A recording has no clock stamps, so edges are spread evenly over each
-    sample.
+    the zero-phase derivative of the full counts. A recording of counts has no clock stamps, so edges are spread evenly
+    over each sample; a capture has its own edges.
 
     Args:
         recorded: the recording.

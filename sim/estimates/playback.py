@@ -41,7 +41,7 @@ def take(controller, state, timing, edges, taken, k):
 
 
 @compiled
-def _take_all(controller, state, timing, edges, taken, first, velocity):
+def take_all(controller, state, timing, edges, taken, first, velocity):
     """Fill `velocity` with the samples from `first` on; return (state, number of edges taken)."""
     for i in range(len(velocity)):
         state, taken = take(controller, state, timing, edges, taken, first + i)
@@ -88,5 +88,5 @@ def velocities(
         state = axis.state
         for first in range(0, samples, CHUNK):
             velocity = np.zeros(min(CHUNK, samples - first), number_of(backend))
-            state, taken = _take_all(axis.controller, state, spec.design.timing, passed.edges, taken, first, velocity)
+            state, taken = take_all(axis.controller, state, spec.design.timing, passed.edges, taken, first, velocity)
             yield first, velocity * unit, int(state.flags)

@@ -7,7 +7,10 @@ constant, so it adds no velocity. The axis is described in `replay_axis`.
 The bound C on the acceleration, from which an estimator gets its gains, is computed by `reference` unless it is given.
 A recording that hardly accelerates gets a C that moves one count over its whole length, which the counts cannot
 distinguish from no acceleration, or the least C that the words can hold with its travel and speed
-(`replay_axis.ACCELERATION_RANGE`). A change too fast for the pins at a clock of `CLOCK_MAX_HZ` is an error.
+(`model.motion.ACCELERATION_RANGE`). A change too fast for the pins at a clock of `CLOCK_MAX_HZ` is an error.
+
+A capture of edges has real stamps: where the counts go through pins, its own edges do (`captured`). An estimate is
+judged after the first second; of a capture, which may be shorter, at most its first quarter is left out.
 """
 
 import hashlib
@@ -24,20 +27,24 @@ from ...model.encoder.quadrature_speed import max_edge_rate
 from ...model.estimators import registry
 from ...model.motion import least_acceleration
 from ...model.record_axis import GLITCH_CLOCKS
-from ...model.record_time import SECOND
+from ...model.record_time import SECOND, RecordTime
 from ...model.runtime.result import Summary
 from ...model.runtime.whole_file import whole_file
 from ...model.spec import AxisSpec
 from ..loop.backends import BACKENDS, is_exact
-from .recording import Recording
+from ..recordings.recording import EdgeRecord, Recording
+from .captured import CLOCK_MAX_HZ, closest_s, coarse, position_counts, run_edges, with_clock
 from .reference import REFERENCE_HZ, SETTLE_S, acceleration_bound, judged_from, zero_phase_velocity
 from .replay_axis import axis_spec, needs_pins, run
+from .settings import Settings, applied
 
-CLOCK_MAX_HZ = 100e6
-"""The fastest clock of a replay; counts that change too fast for it are a fault of the recording, not a motion."""
 COARSEN_MAX = (1 << 31) - 1
 EDGES_MAX = 1 << 24
 """The most edges in a sample that go through the pins: all of them are in memory."""
+
+
+DERIVED = Settings()
+"""The settings that all follow from C."""
 
 
 class ReplayError(ValueError):
@@ -65,7 +72,7 @@ class Replay(Summary):
         coarsen: divisor of the counts that the estimator saw (floor division).
         acceleration_max_counts_per_s2: the bound C that set the gains.
         gains: the gains by name, with their units.
-        clock_hz: clock of the axis: that of its pins on `rtl`, without meaning on the other backends.
+        clock_hz: clock of the axis: that of its pins, without meaning where the counts do not go through pins.
         velocity_counts_per_s: the estimate.
         difference_counts_per_s: the plain finite difference of the same counts.
         reference_counts_per_s: the zero-phase derivative of the recorded counts.
@@ -97,7 +104,12 @@ class Replay(Summary):
     @property
     def judged_from(self) -> int:
         """The number of the first sample that is judged."""
-        return judged_from(self.recording.rate_hz)
+        return _judged_from(self.recording)
+
+    @property
+    def by_edges(self) -> bool:
+        """Whether the estimator saw the edges of a capture, with their stamps."""
+        return self.recording.edges is not None and needs_pins(self.estimator, self.backend)
 
     def _rms(self, velocity: np.ndarray) -> float | None:
         error = (velocity - self.reference_counts_per_s)[self.judged_from :]
@@ -130,7 +142,7 @@ class Replay(Summary):
             "backend": self.backend,
             "acceleration_max_counts_per_s2": self.acceleration_max_counts_per_s2,
             "gains": self.gains,
-            "clock_hz": self.clock_hz if self.backend == "rtl" else None,
+            "clock_hz": self.clock_hz if self.backend == "rtl" or self.by_edges else None,
             "reference_hz": self.reference_hz,
             "rms_counts_per_s": self.rms_counts_per_s,
             "rms_fdm_counts_per_s": self.rms_fdm_counts_per_s,
@@ -140,6 +152,16 @@ class Replay(Summary):
             "seconds": self.seconds,
             "samples_per_s": samples / self.seconds,
         }
+
+    def notes(self) -> list[str]:
+        """Return whether the estimator is worse than the plain difference on this recording."""
+        own, plain = self.rms_counts_per_s, self.rms_fdm_counts_per_s
+        if own is None or own <= plain:
+            return []
+        return [
+            f"{self.estimator} is worse than the plain difference on this recording: its RMS error is {own:.4g} "
+            f"counts/s, that of the difference {plain:.4g} counts/s"
+        ]
 
     def save(self, path: str | Path) -> None:
         """Write time, recorded count, velocity and reference of every sample as CSV.
@@ -190,9 +212,15 @@ def _check_names(estimator: str, output: str | None, backend: str) -> str:
     return output
 
 
+def _judged_from(recording: Recording) -> int:
+    """Return the number of the first sample that is judged."""
+    first = judged_from(recording.rate_hz)
+    return first if recording.edges is None else min(first, len(recording.counts) // 4)
+
+
 def check_length(recording: Recording) -> None:
     """Raise ReplayError if no sample of a recording is judged."""
-    if len(recording.counts) <= judged_from(recording.rate_hz):
+    if len(recording.counts) <= _judged_from(recording):
         raise ReplayError(
             f"{recording.file}: must be longer than {SETTLE_S:g} s, after which the estimate is judged, "
             f"not {len(recording.counts)} samples at {recording.rate_hz:g} Hz"
@@ -213,9 +241,22 @@ def _check_numbers(recording: Recording, coarsen: object, bound: float | None) -
 def _counts_for(recording: Recording, count: int, estimator: str, backend: str) -> np.ndarray:
     """Return the counts that the estimator sees; raise ReplayError if they go through pins and change too fast."""
     counts = recording.counts // count
-    if needs_pins(estimator, backend):
+    if recording.edges is not None:
+        _check_edges(recording, coarse(recording.edges, count))
+    elif needs_pins(estimator, backend):
         _check_speed(recording, counts, count, "on rtl" if backend == "rtl" else f"for {estimator}, which times edges,")
     return counts
+
+
+def _check_edges(recording: Recording, edges: EdgeRecord) -> None:
+    """Raise ReplayError if two edges fall into one clock."""
+    if closest_s(edges) * CLOCK_MAX_HZ < 1:
+        place = int(np.argmin(np.diff(edges.ticks))) + 1
+        raise ReplayError(
+            f"{recording.file}, column {recording.column}: edges must be at least {1e9 / CLOCK_MAX_HZ:g} ns apart (a "
+            f"clock of {CLOCK_MAX_HZ / 1e6:g} MHz), not {closest_s(edges) * 1e9:g} ns at "
+            f"{edges.ticks[place] / edges.tick_hz:g} s: if these are glitches, filter them in the capture"
+        )
 
 
 class Plan(NamedTuple):
@@ -226,6 +267,7 @@ class Plan(NamedTuple):
         reference_hz, reference_counts_per_s: cutoff of the reference, and the reference.
         acceleration_max_counts_per_s2: the bound C that sets the gains.
         spec: the axis.
+        edges: the edges that the estimator sees; None where it sees counts.
     """
 
     counts: np.ndarray
@@ -233,6 +275,7 @@ class Plan(NamedTuple):
     reference_counts_per_s: np.ndarray
     acceleration_max_counts_per_s2: float
     spec: AxisSpec
+    edges: EdgeRecord | None
 
 
 def plan(
@@ -241,6 +284,7 @@ def plan(
     backend: str,
     coarsen: int = 1,
     acceleration_max_counts_per_s2: float | None = None,
+    settings: Settings = DERIVED,
 ) -> Plan:
     """Derive what a replay runs; the arguments are those of `replay`.
 
@@ -251,22 +295,36 @@ def plan(
     cutoff = min(REFERENCE_HZ, rate / 4)
     _check_numbers(recording, coarsen, given)
     counts = _counts_for(recording, coarsen, estimator, backend)
-    reference = zero_phase_velocity(recording.counts, rate, cutoff)
+    whole, edges = recording.edges, None
+    position = recording.counts if whole is None else position_counts(whole, rate, len(counts))
+    reference = zero_phase_velocity(position, rate, cutoff)
     bound = given
     if bound is None:
         bound = max(acceleration_bound(reference, rate), least_acceleration(counts) * coarsen * rate**2)
     try:
         spec = axis_spec(counts, coarsen, bound / rate**2, estimator)
     except ValueError as error:
-        why = f"as if {SECOND} samples were a second: {error}"
-        if given is None:
-            raise ReplayError(
-                f"{recording.file}, column {recording.column}: {estimator} cannot take this recording, for no gains "
-                f"fit its acceleration of {bound:g} counts/s^2 ({why})"
-            ) from None
+        raise _unfit(recording, estimator, bound, given is not None, error) from None
+    try:
+        spec = applied(spec, settings, rate)
+    except ValueError as error:
+        raise ArgumentError("settings", f"must give an axis (as if {SECOND} samples were a second): {error}") from None
+    if whole is not None and needs_pins(estimator, backend):
+        edges = coarse(whole, coarsen)
+        spec = with_clock(spec, edges, rate)
+    return Plan(counts, cutoff, reference, bound, spec, edges)
+
+
+def _unfit(recording: Recording, estimator: str, bound: float, given: bool, error: ValueError) -> ReplayError:
+    """Return the error of a bound C from which no gains follow."""
+    why = f"as if {SECOND} samples were a second: {error}"
+    if given:
         said = f"must give gains that fit this recording ({why}), not {bound!r}"
-        raise ArgumentError("acceleration_max_counts_per_s2", said) from None
-    return Plan(counts, cutoff, reference, bound, spec)
+        return ArgumentError("acceleration_max_counts_per_s2", said)
+    return ReplayError(
+        f"{recording.file}, column {recording.column}: {estimator} cannot take this recording, for no gains "
+        f"fit its acceleration of {bound:g} counts/s^2 ({why})"
+    )
 
 
 def replay(
@@ -277,17 +335,19 @@ def replay(
     coarsen: int = 1,
     acceleration_max_counts_per_s2: float | None = None,
     progress: Callable[[int], None] | None = None,
+    settings: Settings = DERIVED,
 ) -> Replay:
     """Put a recording through an estimator.
 
     Args:
-        recording: the recording, from `recording.load`.
+        recording: the recording, from `recordings.load`.
         estimator: name of the estimator.
         output: name of its output; None for its first.
         backend: one of `backends.BACKENDS`.
         coarsen: divide the counts by this (floor division).
         acceleration_max_counts_per_s2: the bound C that sets the gains; None to derive it from the recording.
         progress: function called with the number of samples done.
+        settings: gains and bounds that do not follow from C.
 
     Raises:
         ReplayError: in one line, what is refused and what is accepted.
@@ -295,10 +355,12 @@ def replay(
     """
     output = _check_names(estimator, output, backend)
     rate = recording.rate_hz
-    counts, cutoff, reference, bound, spec = plan(
-        recording, estimator, backend, coarsen, acceleration_max_counts_per_s2
-    )
-    velocity, flags, seconds = run(spec, counts, backend, output, progress)
+    planned = plan(recording, estimator, backend, coarsen, acceleration_max_counts_per_s2, settings)
+    counts, cutoff, reference, bound, spec, edges = planned
+    if edges is None:
+        velocity, flags, seconds = run(spec, counts, backend, output, progress)
+    else:
+        velocity, flags, seconds = run_edges(spec, edges, rate, len(counts), backend, output, progress)
 
     lsb = spec.design.estimator.velocity.lsb if is_exact(backend) else 1.0
     return Replay(
@@ -322,10 +384,5 @@ def replay(
 
 def _gains(spec: AxisSpec, rate_hz: float) -> dict[str, float]:
     """Return the gains of an axis by name, in counts and true seconds."""
-    # The power of 1 / time in the unit, by the ending of the name.
-    powers = {"_per_s2": 2, "_per_s": 1, "_hz": 1, "_s": -1}
-    return {
-        name.replace("_m_", "_counts_"): value
-        * (rate_hz / SECOND) ** next((power for ending, power in powers.items() if name.endswith(ending)), 0)
-        for name, value in vars(spec.design.gains).items()
-    }
+    named = RecordTime(rate_hz).named(spec.design.gains)
+    return {name.replace("_m_", "_counts_"): value for name, value in named.items()}

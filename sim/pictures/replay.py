@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..estimates.reference import judged_from
 from ..estimates.replay import Replay
 from .style import LABEL_PT, MARK, TRUTH, looks, name_above, new_figure, page
 
@@ -84,7 +83,7 @@ def _interesting(result: Replay) -> tuple[int, int]:
     """Return the ends of the piece in which the reference changes most, after the first second of a longer record."""
     reference, rate = result.reference_counts_per_s, result.recording.rate_hz
     length = min(max(round(DETAIL_S * rate), 2), len(reference))
-    begin = judged_from(rate) if len(reference) > judged_from(rate) + length else 0
+    begin = result.judged_from if len(reference) > result.judged_from + length else 0
     pieces = np.lib.stride_tricks.sliding_window_view(reference[begin:], length)
     first = begin + int(np.argmax(np.abs(pieces[:, -1] - pieces[:, 0])))
     return first, first + length

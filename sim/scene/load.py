@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from ...model.checks import shown
-from ..jobs.regular_file import content_of
+from ...model.runtime.regular_file import content_of
 from .checks import check
 from .errors import SceneError
 from .schema import Scene

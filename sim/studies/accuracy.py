@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ...model.runtime.result import Table, table_of
-from ..estimates import recording
 from ..estimates.accuracy import COARSEN, encoder_of, measure, measure_recording, said_of, spec_of
 from ..estimates.replay import check_length, plan
 from ..jobs.parallel import Run
+from ..recordings.recording import Recording
 from ..walls.methods import Curve
 
 
@@ -72,14 +72,14 @@ def jobs(curves: list[Curve], names: list[str], rates_hz: list[int], options: di
 
 @dataclass(frozen=True)
 class Recordings:
-    """Recordings, each read once: a job has the digest of the bytes that its counts come from.
+    """Recordings, each read once: a job has the digest of its counts.
 
     Attributes:
         read: the recordings, by digest and column.
         jobs: the arguments of `measure`, which JSON can hold.
     """
 
-    read: dict[tuple[str, str], recording.Recording]
+    read: dict[tuple[str, str], Recording]
     jobs: list[dict]
 
     def measure(self, file: str, column: str, content: str, **how: str) -> dict:
@@ -87,21 +87,19 @@ class Recordings:
         return measure_recording(replace(self.read[content, column], file=file), **how)
 
 
-def recordings_of(curves: list[Curve], recorded: list[tuple[str, str]], backend: str) -> Recordings:
-    """Return the recordings of (file, column) pairs, to be put through every estimator.
+def recordings_of(curves: list[Curve], recorded: list[Recording], backend: str) -> Recordings:
+    """Return recordings, to be put through every estimator.
 
     Raises:
-        RecordingError, ReplayError: if a recording is not valid, or too short to be judged, or an estimator cannot take
-            it.
+        ReplayError: if a recording is too short to be judged, or an estimator cannot take it.
     """
     read, jobs = {}, []
-    for file, column in recorded:
-        counts = recording.load(file, column)
+    for counts in recorded:
         check_length(counts)
         for estimator in dict.fromkeys(curve.estimator for curve in curves):
             plan(counts, estimator, backend, COARSEN)
-        read[counts.content, column] = counts
-        keys = {"file": file, "column": column, "content": counts.content, "backend": backend}
+        read[counts.content, counts.column] = counts
+        keys = {"file": counts.file, "column": counts.column, "content": counts.content, "backend": backend}
         jobs += [{"estimator": curve.estimator, "output": curve.output} | keys for curve in curves]
     return Recordings(read, jobs)
 
@@ -110,7 +108,7 @@ def study(
     figure: int | None,
     curves: list[Curve],
     motions: list[tuple[str, dict]],
-    recorded: list[tuple[str, str]],
+    recorded: list[Recording],
     backend: str,
     run: Run,
 ) -> Accuracy:
@@ -120,13 +118,13 @@ def study(
         figure: number of the founding paper's figure; None for none.
         curves: the estimators.
         motions: result of `jobs`.
-        recorded: file and column of every recording.
+        recorded: the recordings.
         backend: one of `backends.BACKENDS`.
         run: what does the jobs.
 
     Raises:
         ValueError: if the arguments of a motion are not valid.
-        RecordingError, ReplayError: see `recordings_of`.
+        ReplayError: see `recordings_of`.
         RuntimeError: if the RTL could not be built.
     """
     labels, known = [label for label, _ in motions], [job for _, job in motions]

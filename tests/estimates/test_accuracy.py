@@ -16,8 +16,8 @@ from hardwall.sim.estimates.accuracy import (
     measure_recording,
     outputs,
 )
-from hardwall.sim.estimates.recording import load
 from hardwall.sim.estimates.replay import replay
+from hardwall.sim.recordings.load import load
 from stimuli.lengths import LONG, some_of
 from stimuli.outputs import EVERY_OUTPUT
 

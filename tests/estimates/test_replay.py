@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from hardwall.model.estimators.registry import ESTIMATORS
-from hardwall.sim.estimates.recording import Recording, load
 from hardwall.sim.estimates.replay import ReplayError, check_length, replay
 from hardwall.sim.pictures.replay import draw
 from hardwall.sim.pictures.style import SUFFIXES, save
+from hardwall.sim.recordings.load import load
+from hardwall.sim.recordings.recording import Recording
 from hardwall.testing import rng
 from stimuli.lengths import LONG
 from stimuli.replays import BOUND, COARSEN, EVERY, recording, reference_of, swing

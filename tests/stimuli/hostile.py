@@ -57,6 +57,13 @@ GOOD: dict[str, tuple[str, ...]] = {
     "rate": ("1000", "1e4"),
     "signal": ("paper", "stop", "flicker", "steady:5", "recording.csv:counts"),
     "column": ("counts", "time_s"),
+    "time": ("time_s", "none"),
+    "time_unit": ("s", "ms"),
+    "unit": ("counts", "rad"),
+    "count": ("1", "2pi/2048"),
+    "counter_bits": ("16", "32"),
+    "gaps": ("refuse", "hold", "split"),
+    "channels": ("1,2", "A,B"),
     "coarsen": ("1", "4"),
     "file": ("recording.csv",),
     "files": ("report.json",),
@@ -101,6 +108,8 @@ SHORT = {
     "protocol.start_m": "-0.0005", "protocol.settle_s": "0.1", "protocol.mean_s": "0.01", "protocol.measure_s": "0.02",
 }  # fmt: skip
 """Scene keys that make a hit short enough to be run thousands of times."""
+OF_A_REPLAY = "controller.edge_error_max_counts=0.2"
+"""A key of a replay, which has no scene."""
 
 
 @dataclass(frozen=True)
@@ -249,14 +258,17 @@ ENVIRONS = (
 def calls(draw: st.DrawFn, name: str) -> Call:
     """Return calls of a command."""
     parameters = takes(name)
-    short = [word for key, value in SHORT.items() for word in ("--set", f"{key}={value}")] * ("set_" in parameters)
+    of_a_scene = "set_" in parameters and name != "replay"
+    short = [word for key, value in SHORT.items() for word in ("--set", f"{key}={value}")] * of_a_scene
     words = [name, *short]
     for parameter in parameters.values():
         required = getattr(parameter, "required", False)
         if parameter.name != "set_" and draw(st.integers(0, 9)) < (9 if required else 3):
             words += draw(_parameter(parameter))
-    if "set_" in parameters:
+    if of_a_scene:
         words += draw(assignments())
+    elif "set_" in parameters:
+        words += draw(st.sampled_from(([], ["--set", OF_A_REPLAY], ["--set", f"{OF_A_REPLAY}x"])))
     if draw(st.integers(0, 19)) == 0:
         words.insert(draw(st.integers(0, len(words))), draw(_hostile()))
     files = {}

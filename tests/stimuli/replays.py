@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from hardwall.sim.estimates.recording import Recording
+from hardwall.sim.recordings.recording import Recording
 from stimuli.lengths import LONG
 from stimuli.outputs import EVERY_OUTPUT
 

@@ -5,8 +5,10 @@ import re
 import numpy as np
 import pytest
 
-from hardwall.sim.estimates import recording
-from hardwall.sim.estimates.recording import RecordingError, load
+from hardwall.sim.recordings import load as load_module
+from hardwall.sim.recordings import text
+from hardwall.sim.recordings.error import RecordingError
+from hardwall.sim.recordings.load import load
 
 GOOD = ["0.000,5", "0.001,6", "0.002,4", "0.003,4"]
 
@@ -28,12 +30,12 @@ def test_other_columns_may_hold_anything(read):
 
 
 @pytest.mark.parametrize(
-    "text",
+    "content",
     ["counts\r\n1\r\n2\r\n", "\ufeffcounts\n1\n2\n", "counts\n1\n2", "counts\n1\n2\n\n\n", "counts\n +1 \n2.0\n"],
     ids=["crlf", "byte order mark", "no last newline", "blank lines at the end", "whole numbers in other forms"],
 )
-def test_forms_of_text_that_are_accepted(read, text):
-    assert read(text, rate_hz=10).counts.tolist() == [1, 2]
+def test_forms_of_text_that_are_accepted(read, content):
+    assert read(content, rate_hz=10).counts.tolist() == [1, 2]
 
 
 @pytest.mark.parametrize(
@@ -162,10 +164,10 @@ def test_a_header_of_any_length_is_echoed_in_part(refused):
 
 
 def test_samples_and_bytes_are_bounded(refused, monkeypatch):
-    monkeypatch.setattr(recording, "SAMPLES_MAX", 3)
+    monkeypatch.setattr(load_module, "SAMPLES_MAX", 3)
     assert "line 5: must have at most 3 samples (data lines)" in refused(GOOD)
-    monkeypatch.setattr(recording, "BYTES_MAX", 20)
-    assert "cannot be read (it has more than 2e-05 MB); must be a CSV file" in refused(GOOD)
+    monkeypatch.setattr(text, "BYTES_MAX", 20)
+    assert "cannot be read (it has more than 2e-05 MB of text)" in refused(GOOD)
 
 
 @pytest.mark.parametrize("name", ["davinci_L2_02.csv", "davinci_L2_22.csv", "davinci_R5_42.csv"])

@@ -2,19 +2,22 @@
 
 import pytest
 
-from hardwall.sim.estimates.recording import RecordingError, load
+from hardwall.sim.recordings.error import RecordingError
+from hardwall.sim.recordings.load import load
+from hardwall.sim.recordings.recording import Reading
 
 
 @pytest.fixture
 def read(tmp_path):
-    """Return a function that loads a column of a file of the given text, bytes or lines after a header."""
+    """Return a function that loads a column of a file of the given text, bytes or lines after a header; further
+    arguments are fields of `Reading`."""
 
-    def load_text(content, column="counts", rate_hz=None, header="time_s,counts"):
-        path = tmp_path / "spindle.csv"
+    def load_text(content, column="counts", rate_hz=None, header="time_s,counts", file="spindle.csv", **reading):
+        path = tmp_path / file
         if isinstance(content, list):
             content = "\n".join([header, *content]) + "\n"
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
-        return load(path, column, rate_hz)
+        return load(path, column, rate_hz, Reading(**reading))
 
     return load_text
 
@@ -28,7 +31,7 @@ def refused(read):
             read(*args, **kwargs)
         text = str(caught.value)
         assert "\n" not in text
-        assert "spindle.csv" in text
+        assert "spindle" in text
         return text
 
     return message

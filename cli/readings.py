@@ -1,0 +1,109 @@
+"""The options that say how a recording is to be read, which `replay` and `accuracy` share."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from ..model.checks import shown
+from ..sim.recordings.counts import UNITS, size_of
+from ..sim.recordings.error import RecordingError
+from ..sim.recordings.gaps import RULES
+from ..sim.recordings.load import load
+from ..sim.recordings.recording import Reading, Recording
+from ..sim.recordings.stamps import UNITS as TIME_UNITS
+from ..sim.recordings.steps import COUNTER_BITS
+from .errors import BadInput, one_line
+from .study import StudyOptions
+from .terminal import log, progress
+
+CHANNELS = 2, 3
+"""The least and the most channels of an encoder: A and B, and Z."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReadingOptions(StudyOptions):
+    """The options of a recording; those of a study come with them."""
+
+    rate: Annotated[
+        float | None, typer.Option(metavar="HZ", help="sample rate of a recording", show_default="from its times")
+    ] = None
+    time: Annotated[
+        str | None,
+        typer.Option(metavar="COLUMN", help="column of times, or `none`", show_default="by its name"),
+    ] = None
+    time_unit: Annotated[
+        Literal[(*TIME_UNITS, "iso")] | None, typer.Option(help="unit of the times", show_default="by name or rate")
+    ] = None
+    unit: Annotated[Literal[UNITS], typer.Option(help="unit of the column")] = "counts"
+    count: Annotated[
+        str | None,
+        typer.Option(metavar="SIZE", help="size of a count in that unit, e.g. 0.005, 360/40000 or 2pi/2048"),
+    ] = None
+    counter_bits: Annotated[
+        int | None,
+        typer.Option(min=COUNTER_BITS[0], max=COUNTER_BITS[1], help="width of the counter", show_default="found"),
+    ] = None
+    gaps: Annotated[Literal[RULES], typer.Option(help="what becomes of missing samples")] = "refuse"
+    channels: Annotated[
+        str | None,
+        typer.Option(metavar="A,B[,Z]", help="channels of a capture, by name or number", show_default="by their names"),
+    ] = None
+
+    @property
+    def reading(self) -> Reading:
+        """What the options say of a file.
+
+        Raises:
+            BadInput: if they contradict each other.
+        """
+        size = None if self.count is None else size_of(self.count)
+        if self.count is not None and size is None:
+            raise BadInput(f"--count must be a positive number, or as 360/40000 or 2pi/2048, not {shown(self.count)}")
+        if size is not None and self.unit == "counts":
+            raise BadInput("--count needs --unit rad, deg, turns or m: it is the size of a count in that unit")
+        channels = tuple(each.strip() for each in self.channels.split(",")) if self.channels else ()
+        if self.channels is not None and not CHANNELS[0] <= len(channels) <= CHANNELS[1]:
+            raise BadInput(
+                f"--channels must be two or three names or numbers, A,B or A,B,Z, not {shown(self.channels)}"
+            )
+        return Reading(
+            time=self.time,
+            time_unit=self.time_unit,
+            unit=self.unit,
+            count=size,
+            counter_bits=self.counter_bits,
+            gaps=self.gaps,
+            channels=channels,
+        )
+
+    def read(self, file: str | Path, column: str | None) -> Recording:
+        """Return the recording in a file.
+
+        Raises:
+            BadInput: if it is refused.
+        """
+        try:
+            with progress(f"reading {Path(file).name}", _size(file)) as advance:
+                return load(file, column, self.rate, self.reading, advance)
+        except RecordingError as error:
+            raise BadInput(str(error)) from None
+
+
+def say(recorded: Recording) -> None:
+    """Say on stderr what was understood of a file: with the result, for what is refused is one line alone."""
+    said = f"{Path(recorded.file).name}: {'; '.join(recorded.notes)}"
+    log.print(one_line(said), style="dim", soft_wrap=True)
+
+
+READING = "rate", "time", "time_unit", "unit", "count", "counter_bits", "gaps", "channels"
+"""The names of the options of a recording."""
+
+
+def _size(file: str | Path) -> int:
+    """Return the size of a file, bytes; 1 for one that is not there, which is said when it is read."""
+    try:
+        return max(Path(file).stat().st_size, 1)
+    except OSError:
+        return 1

@@ -1,0 +1,123 @@
+"""Captures through an axis: the words of every backend, the clock, the reference, and what stamps are worth."""
+
+import numpy as np
+import pytest
+
+from hardwall.sim.estimates.captured import closest_s, coarse, position_counts
+from hardwall.sim.estimates.replay import ReplayError, check_length, replay
+from hardwall.sim.recordings.decoded import counts_at
+from hardwall.sim.recordings.recording import EdgeRecord, Recording
+
+TICK_HZ = 25e6
+
+
+def swing(seconds=1.5, amplitude=500.0, frequency_hz=1.0):
+    """Return the edges of a swing about half a count, at the ticks of a logic analyser, and its exact velocity."""
+    fine = np.arange(int(seconds * 1e6)) / 1e6
+    position = 0.5 + amplitude * (1 - np.cos(2 * np.pi * frequency_hz * fine))
+    cells = np.floor(position).astype(int)
+    places = np.flatnonzero(np.diff(cells)) + 1
+    assert np.abs(np.diff(cells)).max() == 1
+    ticks = np.rint(fine[places] * TICK_HZ).astype(np.int64)
+    return EdgeRecord(TICK_HZ, ticks, cells[places].astype(np.int64), int(cells[0]))
+
+
+def recording(edges, rate_hz=1000.0, seconds=1.5):
+    counts = counts_at(edges, rate_hz, int(seconds * rate_hz))
+    return Recording("made.sr", "A,B", counts, rate_hz, edges=edges)
+
+
+MADE = swing()
+
+
+def velocity(rate_hz, samples):
+    return 1000.0 * np.pi * np.sin(2 * np.pi * np.arange(samples) / rate_hz)
+
+
+@pytest.mark.parametrize("coarsen", [1, 16])
+@pytest.mark.parametrize(("estimator", "output"), [("levant", "u1"), ("period", "u"), ("edge-kalman", "u")])
+def test_edges_through_the_pins_of_the_hardware_give_the_words_of_the_model(estimator, output, coarsen):
+    made = recording(MADE)
+    fixed = replay(made, estimator, output, "fixed", coarsen, 2e4)
+    rtl = replay(made, estimator, output, "rtl", coarsen, 2e4)
+    assert fixed.velocity_sha256 == rtl.velocity_sha256
+    assert fixed.flags == rtl.flags == []
+    assert rtl.by_edges
+    assert rtl.clock_hz >= TICK_HZ
+
+
+def test_counts_at_the_strobes_are_the_recorded_counts():
+    """The plain difference, through pins on `rtl` and from counts on `fixed`, has the same words."""
+    made = recording(MADE)
+    assert replay(made, "fdm", backend="rtl").velocity_sha256 == replay(made, "fdm").velocity_sha256
+
+
+def test_real_stamps_are_worth_more_than_edges_that_are_spread():
+    """With the same counts, an estimator by stamps is closer to the exact velocity where it sees the real edges."""
+    made = recording(MADE)
+    bare = Recording("made.csv", "counts", made.counts, made.rate_hz)
+    exact = velocity(made.rate_hz, len(made.counts))
+    errors = []
+    for each in (made, bare):
+        found = replay(each, "levant-edge", acceleration_max_counts_per_s2=2e4)
+        errors.append(float(np.sqrt(np.mean((found.velocity_counts_per_s - exact)[500:] ** 2))))
+    assert errors[0] < errors[1] / 20
+
+
+def test_the_reference_is_closer_than_that_of_sampled_counts():
+    """Places of edges are exact, counts are floors."""
+    made = recording(MADE)
+    bare = Recording("made.csv", "counts", made.counts, made.rate_hz)
+    exact = velocity(made.rate_hz, len(made.counts))[200:-200]
+    off = [np.abs(replay(each, "fdm").reference_counts_per_s[200:-200] - exact).max() for each in (made, bare)]
+    assert off[0] < 0.01 * off[1]
+
+
+def test_the_position_goes_through_the_edges_and_stays_within_a_count_of_them():
+    """Also where a fast motion ends in a long rest, and where edges come in pairs."""
+    ticks = np.array([10, 20, 21, 40, 41, 42, 43, 5000, 5001, 5002, 9000])
+    counts = np.array([1, 2, 3, 4, 5, 6, 7, 6, 5, 6, 7])
+    edges = EdgeRecord(1e3, ticks, counts, 0)
+    found = position_counts(edges, 1e3, 10_000)
+    places = counts + (np.diff(counts, prepend=0) < 0)
+    assert found[ticks] == pytest.approx(places, abs=1e-9)
+    seen = counts_at(edges, 1e3, 10_000)
+    assert (found >= seen - 1e-9).all()
+    assert (found <= seen + 1 + 1e-9)[10:].all()
+    assert (np.diff(found[10:44]) >= 0).all()
+
+
+def test_the_position_of_few_edges():
+    for ticks, counts, place in (([], [], 7.0), ([100], [8], 8.0)):
+        edges = EdgeRecord(1e3, np.array(ticks, np.int64), np.array(counts, np.int64), 7)
+        assert position_counts(edges, 1e3, 3).tolist() == [place] * 3
+
+
+def test_coarser_edges_are_those_of_coarser_counts():
+    edges = coarse(MADE, 16)
+    assert (np.abs(np.diff(edges.counts)) == 1).all()
+    for rate in (1000.0, 333.0):
+        assert (counts_at(edges, rate, 400) == counts_at(MADE, rate, 400) // 16).all()
+
+
+def test_edges_too_close_for_any_clock_are_refused():
+    edges = EdgeRecord(1e9, np.array([1000, 500_000, 500_005]), np.array([1, 2, 3]), 0)
+    assert closest_s(edges) == 5e-9
+    with pytest.raises(
+        ReplayError, match=r"edges must be at least 10 ns apart .*, not 5 ns at 0\.000500005 s: if these"
+    ):
+        replay(Recording("made.sr", "A,B", np.arange(100), 1000.0, edges=edges), "period")
+
+
+def test_a_capture_shorter_than_a_second_is_judged_after_its_first_quarter():
+    short = recording(swing(0.4), seconds=0.4)
+    check_length(short)
+    assert replay(short, "fdm").judged_from == 100
+    assert replay(short, "fdm").rms_counts_per_s > 0
+    assert replay(recording(MADE), "fdm").judged_from == 375
+
+
+def test_a_capture_without_edges_is_at_rest():
+    none = EdgeRecord(1e6, np.zeros(0, np.int64), np.zeros(0, np.int64), 0)
+    found = replay(Recording("made.sr", "A,B", np.zeros(500, int), 1000.0, edges=none), "period")
+    assert not found.velocity_counts_per_s.any()

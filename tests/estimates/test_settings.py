@@ -1,0 +1,60 @@
+"""Settings of a replay: gains, jerk and edge error by their keys, in counts and seconds, and those that are refused."""
+
+import pytest
+
+from hardwall.model.estimators.registry import ESTIMATORS
+from hardwall.sim.estimates.replay import ArgumentError, replay
+from hardwall.sim.estimates.settings import SettingError, Settings, names_of, settings_of
+from stimuli.replays import BOUND, COARSEN, recording, swing
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("rate", [1000.0, 333.0])
+def test_the_gains_of_a_report_can_be_given_back(estimator, rate):
+    """Units and powers of time are those of the report: the words are the same, to the last."""
+    made = recording(swing().counts, rate)
+    derived = replay(made, estimator, coarsen=COARSEN)
+    assert list(derived.gains) == list(names_of(estimator))
+    changes = {f"controller.gains.{estimator}.{name}": value for name, value in derived.gains.items()}
+    given = replay(made, estimator, coarsen=COARSEN, settings=settings_of(changes, estimator))
+    assert given.gains == pytest.approx(derived.gains, rel=1e-12)
+    assert given.velocity_sha256 == derived.velocity_sha256
+
+
+def test_gains_change_the_words_and_the_report():
+    gains = {"lambda_sqrt_counts_per_s": 900.0, "alpha_counts_per_s2": 5e5}
+    changes = {f"controller.gains.levant.{name}": value for name, value in gains.items()}
+    found = replay(swing(), coarsen=COARSEN, settings=settings_of(changes, "levant"))
+    assert found.gains == pytest.approx(gains, rel=1e-12)
+    assert found.velocity_sha256 != replay(swing(), coarsen=COARSEN).velocity_sha256
+
+
+def test_jerk_and_edge_error_set_the_gains_that_follow_from_them():
+    changes = {"controller.jerk_max_counts_per_s3": 3e6, "controller.edge_error_max_counts": 0.25}
+    found = replay(swing(), "edge-kalman", None, "fixed", 1, BOUND, settings=settings_of(changes, "edge-kalman"))
+    assert found.gains["edge_error_counts"] == 0.25
+    assert found.gains["jerk_counts_per_s3"] == pytest.approx(3e6, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"wall.stiffness_n_per_m": 1.0}, "'wall.stiffness_n_per_m' is not a key of a replay with levant, which has"),
+        ({"controller.gains.kalman.x": 1.0}, "is not a key of a replay with levant"),
+        ({"controller.gains.levant.alpha_counts_per_s2": 1.0}, "must have all its gains: lambda_sqrt_counts_per_s is"),
+        ({"controller.jerk_max_counts_per_s3": "x"}, "jerk_max_counts_per_s3 must be a number of 1e-15 to 1e+15, not"),
+        ({"controller.jerk_max_counts_per_s3": None}, "must be a number of 1e-15 to 1e+15, not None"),
+        ({"controller.edge_error_max_counts": 2}, "edge_error_max_counts must be a number of 1e-06 to 1, not 2"),
+        ({"controller.edge_error_max_counts": True}, "must be a number of 1e-06 to 1, not True"),
+    ],
+)
+def test_settings_that_are_refused(changes, said):
+    with pytest.raises(SettingError) as error:
+        settings_of(changes, "levant")
+    assert said in str(error.value)
+
+
+def test_gains_that_no_axis_has_are_refused():
+    settings = Settings({"lambda_sqrt_counts_per_s": 1e-15, "alpha_counts_per_s2": 1e15})
+    with pytest.raises(ArgumentError, match=r"^settings must give an axis \(as if 1024 samples were a second\): "):
+        replay(swing(), settings=settings)

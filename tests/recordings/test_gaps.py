@@ -1,0 +1,85 @@
+"""Missing and repeated samples: refused, held, or the longest piece; and a sensor that stood."""
+
+import numpy as np
+import pytest
+
+from hardwall.sim.recordings import gaps
+from stimuli.forms import COUNTS
+
+SWING = np.round(4000 * np.sin(np.arange(1000) / 100)).astype(int)
+
+
+def rows(kept):
+    return [f"{k / 1000:.3f},{SWING[k]}" for k in kept]
+
+
+LOST = [k for k in range(1000) if not 300 <= k < 310 and k != 700]
+
+
+def test_gaps_are_refused_with_both_cures(refused):
+    said = refused(rows(LOST))
+    assert "line 302, column time_s: times must be uniform within 0.001 s, not go by 0.011 s" in said
+    assert said.endswith("fill them with the count before (--gaps hold), or keep the longest piece (--gaps split)")
+
+
+def test_gaps_are_held(read):
+    found = read(rows(LOST), gaps="hold")
+    exact = SWING.copy()
+    exact[300:310], exact[700] = SWING[299], SWING[699]
+    assert (found.counts == exact).all()
+    assert found.rate_hz == 1000.0
+    assert "11 missing samples in 2 gaps held" in found.notes
+    assert (read(rows(LOST), gaps="hold", rate_hz=1000).counts == exact).all()
+
+
+def test_the_longest_piece_is_kept(read):
+    found = read(rows(LOST), gaps="split")
+    assert (found.counts == SWING[310:700]).all()
+    assert (found.rate_hz, found.start_s) == (1000.0, 0.31)
+    assert "the longest of 3 pieces, samples 300 to 689" in found.notes
+
+
+@pytest.mark.parametrize("rule", ["hold", "split"])
+def test_repeated_samples_are_taken_out(read, refused, rule):
+    kept = sorted([*range(1000), 200, 200, 555])
+    found = read(rows(kept), gaps=rule)
+    assert (found.counts == SWING).all()
+    assert "3 repeated samples taken out" in found.notes
+    said = refused(rows(kept))
+    assert "line 203, column time_s: times must increase, not go by 0 s" in said
+    assert said.endswith("or take repeated samples out (--gaps hold)")
+
+
+@pytest.mark.parametrize("rule", ["refuse", "hold", "split"])
+def test_two_counts_at_one_time_are_refused_by_every_rule(refused, rule):
+    lines = rows(range(1000))
+    lines[500] = lines[499].partition(",")[0] + ",7"
+    assert "times must increase, not go by 0 s" in refused(lines, gaps=rule)
+
+
+@pytest.mark.parametrize("rule", ["refuse", "hold", "split"])
+def test_jitter_is_no_gap(refused, rule):
+    lines = [f"{k / 1000 + (0.0003 if k == 400 else 0):.4f},{SWING[k]}" for k in range(1000)]
+    assert "times must be uniform within 0.0001 s" in refused(lines, gaps=rule)
+
+
+def test_a_sensor_that_stood_is_held_or_cut(read, refused):
+    counts = SWING.copy()
+    counts[400:450] = counts[400]
+    lines = [f"{k / 1000:.3f},{count}" for k, count in enumerate(counts)]
+    assert "if the sensor or its reading stood" in refused(lines)
+    assert (read(lines, gaps="hold").counts == counts).all()
+    found = read(lines, gaps="split")
+    assert (found.counts == counts[450:]).all()
+    assert found.start_s == 0.45
+
+
+def test_a_gap_too_long_for_memory_is_refused(refused):
+    lines = ["0.000,1", "0.001,1", "0.002,1", "90000.000,2"]
+    assert "must have at most 10000000 samples with those that are missing" in refused(lines, gaps="hold")
+
+
+def test_nothing_to_mend_changes_nothing(read):
+    lines = [f"{k / 1000:.3f},{count}" for k, count in enumerate(COUNTS)]
+    for rule in gaps.RULES:
+        assert (read(lines, gaps=rule).counts == COUNTS).all()

@@ -1,0 +1,98 @@
+"""Times as files give them: exact decimals, float64 printed in full, ISO timestamps, and units."""
+
+import numpy as np
+import pytest
+
+from hardwall.sim.recordings.stamps import Stamps
+from hardwall.sim.recordings.table import Arrays
+from stimuli.forms import COUNTS, angles, rows
+
+TABLE = Arrays("made.npz", "arrays", {"t": np.zeros(2)})
+
+
+def whole(cells, unit="s"):
+    stamps = Stamps(TABLE, "t", unit)
+    stamps.add(range(len(cells)), cells)
+    return stamps.whole()
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        ["1700000000.123456", "1700000000.123457", "1700000000.123459"],
+        ["1700000000.123456", "1700000000.1234570", "1700000000.123459"],
+        ["1700000000123456e-6", "1700000000.123457", "1700000000.123459"],
+    ],
+    ids=["alike", "other decimals", "other forms"],
+)
+def test_differences_of_times_are_exact(cells):
+    """In float64 these times are 2.4e-7 apart."""
+    times = whole(cells)
+    assert times.since.tolist() == [0.0, 1e-6, 3e-6]
+    assert str(times.first) == "1700000000.123456"
+
+
+def test_decimals_of_very_different_size_are_exact():
+    times = whole(["1e-300", "1", "999999999999", "999999999999.000000"])
+    assert times.since.tolist() == [0.0, 1.0, 999999999999.0, 999999999999.0]
+
+
+@pytest.mark.parametrize("unit", ["s", "ns"])
+def test_nanoseconds_since_1970_keep_every_digit(unit):
+    """A robot's log has such times; 19 digits are more than float64 has."""
+    cells = ["1700000000123456789", "1700000000123456790", "1700000000123457789"]
+    if unit == "s":
+        cells = [f"{cell[:-9]}.{cell[-9:]}" for cell in cells]
+    times = whole(cells, unit)
+    assert times.since.tolist() == ([0.0, 1e-9, 1e-6] if unit == "s" else [0, 1, 1000])
+
+
+def test_a_float64_in_full_counts_as_its_shortest_decimal(read):
+    found = read("\n".join(["time_s, angle", *angles()]), "angle", unit="rad", count=2 * np.pi / 2000)
+    assert found.rate_hz == 1000.0
+    assert (found.counts == COUNTS).all()
+    assert str(whole([f"{0.002:.17e}", f"{19.998:.17e}"]).last) == "19.998"
+
+
+@pytest.mark.parametrize(("unit", "per_s"), [("s", 1), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
+def test_units_by_option(read, unit, per_s):
+    lines = [f"{k * per_s / 1000:g},{count}" for k, count in enumerate(COUNTS)]
+    for header in ("time_s,counts", "when,counts"):
+        found = read(lines, header=header, time=header.partition(",")[0], time_unit=unit)
+        assert found.rate_hz == 1000.0
+        assert f"({unit}), 1000 Hz" in "; ".join(found.notes)
+
+
+@pytest.mark.parametrize(
+    "form", ["2024-05-01T12:00:{:09.6f}", "2024-05-01 12:00:{:06.3f}Z", "2024-05-01T12:00:{:06.3f}+02:00"]
+)
+def test_iso_timestamps(read, form):
+    found = read([f"{form.format(k / 1000)},{count}" for k, count in enumerate(COUNTS)], header="timestamp,counts")
+    assert found.rate_hz == 1000.0
+    assert found.start_s == 1714564800 - (7200 if "+" in form else 0)
+    assert "ISO timestamps" in "; ".join(found.notes)
+
+
+def test_iso_timestamps_go_over_midnight_and_are_refused_by_their_line(read, refused):
+    lines = ["2024-12-31T23:59:59.5,1", "2025-01-01T00:00:00.0,2", "2025-01-01T00:00:00.5,3"]
+    assert read(lines, header="time,counts").rate_hz == 2.0
+    lines[1] = "2025-13-01T00:00:00.0,2"
+    said = "line 3, column time: a time must be as 2024-05-01T12:00:00.123, not '2025-13-01T00:00:00.0'"
+    assert said in refused(lines, header="time,counts")
+
+
+def test_times_of_arrays():
+    seconds = 60 + np.arange(100) / 1000
+    assert whole(seconds).since[1] == pytest.approx(1e-3, rel=1e-9)
+    assert whole(np.arange(5, 100, 5)).since[-1] == 90.0
+    moments = np.datetime64("2024-05-01T12:00:00") + np.arange(3) * np.timedelta64(1, "ms")
+    assert whole(moments, None).since.tolist() == [0.0, 0.001, 0.002]
+
+
+def test_a_time_that_is_none_is_refused(refused):
+    lines = list(rows())
+    lines[7] = "0.0x7,1"
+    assert "line 9, column time_s: a time must be a number of seconds of -1e+12 to 1e+12, not '0.0x7'" in refused(lines)
+    assert "column t: a time must be a number of ms of" in refused(
+        ["0,1", "x,2"], header="t,counts", time="t", time_unit="ms"
+    )

@@ -1,0 +1,150 @@
+"""Steps of recorded counts: those of a motion are read, all others are refused by their line, with what helps."""
+
+import re
+
+import numpy as np
+import pytest
+
+MOVED = np.round(4000 * np.sin(np.arange(3000) / 100)).astype(int)
+"""A swing, whose steps are at most 40 counts."""
+
+
+def wrapped(bits):
+    """Return the counts of a motion over two ranges of a counter of so many bits."""
+    half = 1 << (bits - 1)
+    return (np.arange(0, 4 * half, half // 200) + half) % (2 * half) - half
+
+
+def zeroed():
+    counts = MOVED.copy()
+    counts[1500:] -= counts[1500]
+    return counts
+
+
+def held():
+    counts = MOVED.copy()
+    counts[1400:1450] = counts[1400]
+    return counts
+
+
+def one_wrong():
+    counts = MOVED.copy()
+    counts[900] += 5000
+    return counts
+
+
+@pytest.mark.parametrize(
+    ("counts", "said"),
+    [
+        (zeroed(), r"if the counter was set to 0, add \d+ in this line and all after it, or cut the recording at th.*"),
+        (
+            held(),
+            r"if the sensor or its reading stood, for 49 samples before it, take it so \(--gaps hold\), or keep .*",
+        ),
+        (one_wrong(), r"correct this line, or cut the recording at this line"),
+    ],
+    ids=["set to 0", "held", "one wrong"],
+)
+def test_a_step_that_no_motion_makes_is_refused_by_its_line_with_a_cure(refused, counts, said):
+    """Such a step set the range and the gains of every estimator."""
+    message = refused("counts\n" + "".join(f"{count}\n" for count in counts), rate_hz=1000)
+    steps = np.abs(np.diff(counts, prepend=counts[0]))
+    line = int(np.argmax(steps > max(60, 2 * np.median(steps)))) + 2
+    assert f"line {line}, column counts: the count must not go by {np.diff(counts)[line - 3]} in one sample" in message
+    assert re.search(rf"for no motion does that: {said}$", message)
+
+
+@pytest.mark.parametrize("place", [0, 1, 2, 2996, 2997, 2998])
+def test_a_wrong_step_near_an_end_is_refused_too(refused, place):
+    counts = MOVED.copy()
+    counts[place + 1 :] += 9999
+    assert f"line {place + 3}, column counts: the count must not go by " in refused(
+        "counts\n" + "".join(f"{count}\n" for count in counts), rate_hz=1000
+    )
+
+
+@pytest.mark.parametrize("speed", [1, 30, 900, 30_000])
+@pytest.mark.parametrize("place", [1, 2, 50, 98])
+def test_an_impact_is_a_motion(read, speed, place):
+    """A handle that bounces, starts or stops within a sample has steps that are supported on one side."""
+    for after in (-speed, 0, speed // 3, 5 * speed):
+        steps = np.full(100, speed)
+        steps[place:] = after
+        steps[place - 1] = (speed + after) // 2
+        counts = np.concatenate([[0], np.cumsum(steps)])
+        text = "counts\n" + "".join(f"{count}\n" for count in counts)
+        assert (read(text, rate_hz=1000).counts == counts).all()
+
+
+@pytest.mark.parametrize("unit", [1, 16])
+def test_single_counts_and_tremor_are_motions(read, unit):
+    rng = np.random.default_rng(7)
+    for counts in (np.arange(2000) // 300, rng.integers(0, 8, 2000), np.arange(2000) % 2 * 1000, np.zeros(50, int)):
+        text = "counts\n" + "".join(f"{unit * count}\n" for count in counts)
+        assert (read(text, rate_hz=1000).counts == unit * counts).all()
+
+
+# ---- the width of the counter ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("bits", [8, 10, 14, 16, 24, 31])
+@pytest.mark.parametrize("signed", [True, False], ids=["signed", "unsigned"])
+@pytest.mark.parametrize("origin", [0, 12345])
+def test_the_width_of_a_counter_that_wrapped_is_found_and_said(read, bits, signed, origin):
+    """A log may have an origin of its own, taken off before the counter wrapped."""
+    size = 1 << bits
+    exact = np.round(1.7 * size * np.sin(np.arange(3000) / 300)).astype(np.int64)
+    counts = exact % size - (size // 2 if signed else 0) + origin
+    found = read("counts\n" + "".join(f"{count}\n" for count in counts), rate_hz=1000)
+    assert (np.diff(found.counts) == np.diff(exact)).all()
+    wraps = np.count_nonzero(np.diff(counts) != np.diff(exact))
+    assert f"a counter of {bits} bits that wrapped {wraps} times" in found.notes
+
+
+def test_a_counter_that_wrapped_there_and_back_at_rest_is_found(read):
+    counts = np.array([*range(200, 256), *[0, 255, 0, 255, 255, 0, 1, 0, 0, 255], *range(255, 200, -1)])
+    found = read("counts\n" + "".join(f"{count}\n" for count in counts), rate_hz=1000)
+    assert np.abs(np.diff(found.counts)).max() == 1
+    assert "a counter of 8 bits that wrapped 6 times" in found.notes
+
+
+@pytest.mark.parametrize("off", [250, 240, 200])
+def test_a_counter_that_was_set_back_is_not_taken_for_one_that_wrapped(refused, off):
+    """An 8-bit counter that wrapped would go by 6, 16 or 56 where 1 is usual."""
+    counts = np.concatenate([np.arange(0, off + 1), np.arange(0, 100)])
+    said = refused("counts\n" + "".join(f"{count}\n" for count in counts), rate_hz=1000)
+    assert f"line {off + 3}, column counts: the count must not go by {-off}" in said
+
+
+@pytest.mark.parametrize("bit", [10, 14, 16, 20])
+def test_a_flipped_bit_is_not_taken_for_a_wrap(refused, bit):
+    counts = np.abs(MOVED)
+    counts[1234] ^= 1 << bit
+    assert "line 1236, column counts: the count must not go by" in refused(
+        "counts\n" + "".join(f"{count}\n" for count in counts), rate_hz=1000
+    )
+
+
+def test_a_motion_too_fast_for_its_counter_is_refused_with_the_way_on(read, refused):
+    """At more than a quarter of the range a sample, nothing tells the direction, unless the user does."""
+    exact = np.cumsum(np.concatenate([np.arange(100), np.full(100, 100), np.arange(100, 0, -1)]))
+    text = "counts\n" + "".join(f"{count % 256}\n" for count in exact)
+    assert refused(text, rate_hz=1000).endswith("if a counter of 8 bits wrapped, give --counter-bits 8")
+    assert (np.diff(read(text, rate_hz=1000, counter_bits=8).counts) == np.diff(exact)).all()
+
+
+@pytest.mark.parametrize("bits", [8, 12, 16, 32, 48, 62, 63, 64])
+def test_a_width_that_is_given_is_used(read, refused, bits):
+    exact = np.cumsum(np.round(20 * np.sin(np.arange(500) / 60)).astype(int))
+    counts = [int(count) % (1 << bits) for count in exact]
+    if 61 < bits < 64:
+        counts = [count - (1 << bits if count >> (bits - 1) else 0) for count in counts]
+    text = "counts\n" + "".join(f"{count}\n" for count in counts)
+    found = read(text, rate_hz=1000, counter_bits=bits)
+    assert (np.diff(found.counts) == np.diff(exact)).all()
+    assert f"a counter of {bits} bits that wrapped" in found.notes[-1]
+
+
+def test_counts_beyond_the_range_of_their_counter_are_refused(refused):
+    said = refused("counts\n-1\n0\n255\n", rate_hz=1, counter_bits=8)
+    assert "line 4, column counts: counts must span less than 2**8, not 256 up to here: give a larger" in said
