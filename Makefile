@@ -1,7 +1,7 @@
 # Every task of the project; `make help` lists them. Paths here are relative, so that `make -C` works from anywhere.
 #
 #   PYTHON=python3.13         another interpreter; .venv is made anew when it changes
-#   ARGS="-k levant"          more options for pytest (test, soak, fuzz)
+#   ARGS="-k levant"          more options for pytest (test, soak, fuzz), or for uv (lock)
 #   ONLY=hit/mhz              the beginning of the names of the cases to record anew (digests), or of what is checked
 #                             (prove, faults, gate, coverage, mutate); the reports to make (results)
 #   LIST=1                    only say which reports are stale (results)
@@ -60,7 +60,7 @@ PYTEST = $(RUN) pytest -n $(if $(filter 1 2 3 4 5 6 7,$(CORES)),$$(($(CORES) + 1
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures panel browser screenshots verilog docs diagrams results digests soak fuzz clean distclean help tools FORCE
+.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures panel browser screenshots verilog docs diagrams results digests soak fuzz lock clean distclean help tools FORCE
 
 all: $(REPORTS) $(PICTURES) $(TWO_RATES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
@@ -161,6 +161,12 @@ soak: $(VENV)/.test | tools ## 10^9 samples of every estimator, every digest, ev
 fuzz: $(VENV)/.test | tools ## 20 000 hostile calls of the command line, and 200 runs ended at random times (an hour or two)
 	@HARDWALL_FUZZ=$(CALLS) HARDWALL_KILLS=$(KILLS) $(PYTEST) tests/test_fuzz.py tests/test_killed.py $(ARGS)
 
+# Names, versions and hashes; no address of an index, which is for each machine to say. What is in it stays, unless
+# pyproject.toml no longer allows it or ARGS="--upgrade" asks for newer ones.
+lock: $(VENV)/.made | tools ## write requirements.lock anew: the exact versions that make installs, of pyproject.toml's ranges
+	@$(UV) pip compile --quiet --universal --python-version 3.11 --all-extras --generate-hashes --no-annotate \
+	  --custom-compile-command 'make lock' $(ARGS) --output-file $(LOCK) pyproject.toml
+
 clean: ## remove what was built and cached
 	rm -rf build .hypothesis .pytest_cache .ruff_cache
 	find cli hdl host model sim tests -name __pycache__ -prune -exec rm -rf {} +
@@ -210,35 +216,46 @@ INTERPRETER := $(if $(STALE),$(PYTHON),$(VENV)/bin/python)
 
 $(VENV)/.made: $(if $(STALE),FORCE) | tools
 	@"$(PYTHON)" -m venv $(if $(MADE_IN),--clear) $(VENV)
+	@$(PIP) install --quiet --require-hashes --requirement <(sed -n '/^uv==/,/[^\]$$/p' $(LOCK)) 2>$(VENV)/uv.log || true
 	@printf '%s\n' "$(PYTHON)" >$(VENV)/.python
 	@printf '%s\n' "$(CURDIR)" >$@
 
-# Only one pip runs at a time, even in a parallel make; of its output, only the names of the packages are shown. Yosys and
-# the placers compile themselves when they run first, into a file of the user's which all runs read: two first runs at a
-# time would break each other, so they have theirs here.
-SAYS := s/^Collecting \([^ ]*\).*/  \1/p; s/^Installing collected packages.*/  unpacking all of these/p
+# Every version is that of $(LOCK), whose hashes uv checks. Where uv is not to be had, or finds no package, pip takes its
+# place: it checks no hash, for it cannot where a tree is installed in place. Only one installer runs at a time, even in a
+# parallel make; of its output, only the large packages and the end are shown. Yosys and the placers compile themselves
+# when they run first, into a file of the user's which all runs read: two first runs at a time would break each other, so
+# they have theirs here.
+LOCK := requirements.lock
+UNHASHED := sed '/--hash/d; s/ *\\$$//' $(LOCK) >$(VENV)/constraints.txt
+PIP := $(RUN) pip --disable-pip-version-check
+UV := $(VENV)/bin/uv
+SAYS := s/^Downloading \(.*\)/  \1/p; s/^Collecting \([^ ]*\).*/  \1/p; s/^Installed/  installed/p; \
+  s/^Installing collected packages.*/  unpacking all of these/p
 define install
-@echo "Installing into $(VENV), once: $(2) ..."; began=$$SECONDS; \
-  flock $(VENV)/.made $(RUN) pip install --disable-pip-version-check --progress-bar off --editable '.[$(1)]' \
-    | sed -un '$(SAYS)'; \
-  $(foreach tool,$(3),flock $(VENV)/.made $(VENV)/bin/yowasp-$(tool) --version >/dev/null 2>&1;) \
+@echo "Installing into $(VENV), once: $(2) ..."; began=$$SECONDS; exec {lock}<$(VENV)/.made; flock $$lock; \
+  by_uv() { [ -x $(UV) ] && $(UV) pip install --python $(VENV)/bin/python --constraint $(LOCK) \
+    --build-constraint $(LOCK) --editable '.[$(1)]' 2>&1 | tee $(VENV)/uv.log | sed -un '$(SAYS)'; }; \
+  by_pip() { $(UNHASHED); PIP_CONSTRAINT=$(VENV)/constraints.txt $(PIP) install --progress-bar off \
+    --editable '.[$(1)]' | sed -un '$(SAYS)'; }; \
+  if by_uv; then rm $(VENV)/uv.log; else tail -n 1 $(VENV)/uv.log 2>/dev/null || true; echo "  by pip, without uv:"; by_pip; fi; \
+  $(foreach tool,$(3),$(VENV)/bin/yowasp-$(tool) --version >/dev/null 2>&1;) \
   echo "  done in $$((SECONDS - began)) s"
 @touch $@
 endef
 
-$(VENV)/.sim: pyproject.toml $(VENV)/.made | tools
+$(VENV)/.sim: pyproject.toml $(LOCK) $(VENV)/.made | tools
 	$(call install,sim,the model and the loop)
 
-$(VENV)/.test: pyproject.toml $(VENV)/.sim | tools
+$(VENV)/.test: pyproject.toml $(LOCK) $(VENV)/.sim | tools
 	$(call install,sim$(comma)host$(comma)panel$(comma)test,the tests' tools,yosys)
 
-$(VENV)/.panel: pyproject.toml $(VENV)/.sim | tools
+$(VENV)/.panel: pyproject.toml $(LOCK) $(VENV)/.sim | tools
 	$(call install,sim$(comma)host$(comma)panel,the page)
 
-$(VENV)/.synth: pyproject.toml $(VENV)/.sim | tools
+$(VENV)/.synth: pyproject.toml $(LOCK) $(VENV)/.sim | tools
 	$(call install,sim$(comma)synth,place and route,yosys nextpnr-ecp5 nextpnr-ice40 nextpnr-himbaechel-gowin)
 
-$(VENV)/.docs: pyproject.toml $(VENV)/.sim | tools
+$(VENV)/.docs: pyproject.toml $(LOCK) $(VENV)/.sim | tools
 	$(call install,sim$(comma)host$(comma)panel$(comma)docs,the tools of the pages)
 
 # ---- system packages, checked before anything starts ----------------------------------------------------------------

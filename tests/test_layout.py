@@ -1,4 +1,4 @@
-"""The layout of the project: directions of imports, three files a block, pinned versions, nothing of one machine."""
+"""The layout of the project: directions of imports, three files a block, ranges of versions, nothing of one machine."""
 
 import ast
 import importlib.metadata
@@ -11,6 +11,8 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
+
+from hardwall.model.runtime import extras
 
 ROOT = Path(__file__).absolute().parent.parent
 ROOMS = ("cli", "hdl", "host", "model", "sim")
@@ -85,6 +87,11 @@ MODULES = {module_of(path): path for path in SOURCES}
 def plain(name: str) -> str:
     """Return the name of a distribution in the form that package indexes compare."""
     return name.replace("_", "-").lower()
+
+
+def package_of(requirement: str) -> str:
+    """Return the name of the package that a requirement is of."""
+    return re.match(r"[\w-]+", requirement)[0]
 
 
 def imports(path: Path) -> Iterator[str]:
@@ -275,11 +282,32 @@ def test_the_model_needs_only_numpy_and_numba():
     assert "numba" in loaded
 
 
-def test_versions_are_pinned():
+def requirements() -> list[str]:
+    """Return every requirement of the project, and of its build."""
     lists = [CONFIG["build-system"]["requires"], CONFIG["project"]["dependencies"], *EXTRAS.values()]
-    requirements = [requirement for one in lists for requirement in one]
-    assert len(requirements) > len(lists)
-    assert [each for each in requirements if not re.fullmatch(r"[A-Za-z0-9-]+==[0-9][0-9a-z.]*", each)] == []
+    return [requirement for one in lists for requirement in one if not requirement.startswith("hardwall[")]
+
+
+def test_versions_are_ranges():
+    """Of one form, for the program itself reads it."""
+    form = re.compile(r"[A-Za-z0-9-]+>=[0-9][0-9.]*(,<[0-9][0-9.]*)?")
+    assert len(requirements()) > 50
+    assert [each for each in requirements() if not form.fullmatch(each)] == []
+
+
+def test_a_package_has_one_range():
+    ranges = {
+        name: {each for each in requirements() if package_of(each) == name} for name in map(package_of, requirements())
+    }
+    assert {name: spans for name, spans in ranges.items() if len(spans) > 1} == {}
+
+
+def test_the_lock_has_a_version_in_every_range_with_its_hashes_and_no_address():
+    lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+    locked = dict(re.findall(r"^([a-z0-9.-]+)==([^ ]+).*\\\n    --hash=sha256:[0-9a-f]{64}", lock, re.M))
+    assert "://" not in lock
+    bounds = {package_of(each): tuple(each.removeprefix(package_of(each)).split(",")) for each in requirements()}
+    assert {name for name, span in bounds.items() if not extras._within(locked.get(plain(name), "0"), span)} == set()
 
 
 @pytest.mark.parametrize("path", [*SOURCES, *TESTS], ids=identity)
@@ -287,9 +315,9 @@ def test_what_is_imported_is_what_its_extra_installs(path):
     for_tests = path in TESTS or path.stem.startswith("cocotb_")
     room = path.relative_to(ROOT).parts[0]
     of_room = {"model": [], "host": ["host", "panel"], "cli": ["sim", "host"]}
-    extras = of_room.get(room, ["sim", "host", "panel", "test"] if for_tests else ["sim"])
-    pinned = [CONFIG["project"]["dependencies"], *(EXTRAS[extra] for extra in extras)]
-    installed = {plain(requirement.partition("==")[0]) for one in pinned for requirement in one}
+    of_it = of_room.get(room, ["sim", "host", "panel", "testing", "test"] if for_tests else ["sim"])
+    lists = [CONFIG["project"]["dependencies"], *(EXTRAS[extra] for extra in of_it)]
+    installed = {plain(package_of(requirement)) for one in lists for requirement in one}
     installed.add("llvmlite")  # a dependency of Numba
     pages = (page.stem for page in (ROOT / "docs").glob("*.py"))
     ours = {"hardwall", *pages, *(test.stem for test in TESTS), *(test.parent.name for test in TESTS)}

