@@ -272,6 +272,48 @@ def test_an_import_of_the_model_touches_no_folder_and_asks_for_no_home():
     assert (done.returncode, done.stderr) == (0, "")
 
 
+WITHOUT_POSIX = """
+import importlib, os, signal, socket, sys
+# What others import of POSIX here, they do not import there.
+import asyncio, fastapi, nicegui, numba, pymodbus.client, serial, uvicorn
+for name in ("fcntl", "grp", "pty", "pwd", "resource", "termios", "tty"):
+    sys.modules[name] = None
+for module, names in (
+    (os, "fork getuid geteuid killpg mkfifo setsid uname O_NONBLOCK"),
+    (signal, "SIGALRM SIGHUP SIGKILL SIGPIPE pthread_sigmask setitimer"),
+    (socket, "AF_UNIX SOCK_SEQPACKET SO_PEERCRED"),
+):
+    for name in names.split():
+        delattr(module, name)
+for name in sys.argv[1:]:
+    importlib.import_module(name)
+from hardwall.host import PortError, connect
+from hardwall.model.axis import Axis
+from hardwall.model.spec import AxisSpec
+spec = AxisSpec(
+    clock_hz=1_000_000, sample_hz=10_000, actuation_hz=10_000, count_m=1e-6, travel_m=0.1, speed_max_m_per_s=1.0,
+    acceleration_max_m_per_s2=10.0, force_max_n=10.0, force_resolution_n=1e-3, stiffness_max_n_per_m=1e3,
+    damping_max_n_s_per_m=10.0, estimator="fdm",
+)
+print(Axis(spec, wall_stiffness=1e3).run([0, 20, 40, 60]).force.tolist())
+try:
+    connect("tcp://127.0.0.1:1")
+except PortError as error:
+    print(error)
+"""
+
+
+def test_model_and_host_work_where_there_is_no_posix():
+    """On Windows only the simulation and its boards do not run."""
+    modules = sorted(name for name in MODULES if name.startswith(("hardwall.model", "hardwall.host")))
+    command = [sys.executable, "-c", WITHOUT_POSIX, *(name for name in modules if not name.endswith("__main__"))]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    forces, refused = done.stdout.splitlines()
+    assert forces == "[0, -20, -40, -60]"
+    assert refused.startswith("tcp://127.0.0.1:1 cannot be opened: ")
+
+
 def test_the_model_needs_only_numpy_and_numba():
     modules = sorted(name for name in MODULES if name.startswith("hardwall.model"))
     program = f"import sys, {', '.join(modules)}; print(*sys.modules)"
