@@ -8,6 +8,7 @@
 #   AGAIN=1                   find anew what is kept in tests/signoff/findings/ (the same five)
 #   SEEDS="1 2" SAMPLES=10000 ENDURANCE=1000000
 #                             the seeds, the samples for every seed, and the samples of endurance (soak)
+#   PYTHONS="python3.12"      the interpreters to install for (matrix); those that are not there are left out
 #   CALLS=1000 KILLS=16       the hostile calls, and the runs that are ended (fuzz)
 
 SHELL := /bin/bash
@@ -54,6 +55,7 @@ SAMPLES ?= 1000000
 ENDURANCE ?= 1000000000
 CALLS ?= 20000
 KILLS ?= 200
+PYTHONS ?= python3.11 python3.12 python3.13 python3.14 python3.15
 # Up to 8 cores, one process more than there are, because some tests wait.
 CORES = $(shell getconf _NPROCESSORS_ONLN)
 PYTEST = $(RUN) pytest -n $(if $(filter 1 2 3 4 5 6 7,$(CORES)),$$(($(CORES) + 1)),8) --dist worksteal
@@ -162,7 +164,7 @@ fuzz: $(VENV)/.test | tools ## 20 000 hostile calls of the command line, and 200
 	@HARDWALL_FUZZ=$(CALLS) HARDWALL_KILLS=$(KILLS) $(PYTEST) tests/test_fuzz.py tests/test_killed.py $(ARGS)
 
 matrix: $(VENV)/.test | tools ## the wheel with each extra, installed elsewhere: oldest and newest packages, every Python (half an hour)
-	@HARDWALL_MATRIX=1 $(RUN) pytest -n 0 -o faulthandler_timeout=0 tests/test_installed.py $(ARGS)
+	@HARDWALL_MATRIX="$(PYTHONS)" $(RUN) pytest -n 0 -o faulthandler_timeout=0 tests/test_installed.py $(ARGS)
 
 # Names, versions and hashes; no address of an index, which is for each machine to say. What is in it stays, unless
 # pyproject.toml no longer allows it or ARGS="--upgrade" asks for newer ones.

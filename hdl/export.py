@@ -101,7 +101,7 @@ def to_verilog(component: wiring.Component, name: str) -> str:
 def to_netlist(component: wiring.Component, name: str) -> _nir.Netlist:
     """Return the netlist of `component` that `to_verilog` writes as text: Amaranth's own, before any tool has seen it.
 
-    Amaranth, whose version is pinned, has no public name for it.
+    Amaranth has no public name for it: its range in pyproject.toml ends before the next minor version.
     """
     ports = {
         "__".join(map(str, path)): (

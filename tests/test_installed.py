@@ -20,8 +20,8 @@ from support import environments, virtual_boards
 from support.environments import ROOT, Environment, Source
 from support.pages import Block, blocks
 
-MATRIX = bool(os.environ.get("HARDWALL_MATRIX"))
-"""Whether packages are installed from the index."""
+MATRIX = environments.sources(os.environ.get("HARDWALL_MATRIX", "").split())
+"""What is installed from the index, for the interpreters that the variable names."""
 SHORT = "--set", "protocol.settle_s=0.5", "--set", "protocol.measure_s=0.2"
 # A loop with this estimator is compiled soonest.
 HIT = "hardwall", "hit", "seed-2011", "--estimator", "fdm", *SHORT, "--json"
@@ -52,7 +52,7 @@ def wheel(tmp_path_factory) -> Path:
     return environments.built(tmp_path_factory.mktemp("built"))[1]
 
 
-@pytest.fixture(params=environments.sources() if MATRIX else [Source()], ids=str)
+@pytest.fixture(params=MATRIX or [Source()], ids=str)
 def place(request, wheel):
     """Return a context with an environment of an extra."""
 
@@ -96,7 +96,8 @@ def test_without_an_extra_the_first_example_of_the_guide_runs(place):
     with place() as environment:
         done = environment.run("python", "-c", block.text)
         assert (done.returncode, done.stdout) == (0, block.printed), done.stderr
-        assert done.stderr.splitlines() == [NO_HOME]
+        if environment.user is not None:
+            assert done.stderr.splitlines() == [NO_HOME]
         told(environment.run("hardwall", "--help"), "sim")
 
 

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tarfile
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,8 +23,6 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).absolute().parents[2]
 STRANGER = 54321
 """A user of whom the system knows nothing: without a name, a home or a file."""
-OLDEST_MINOR, NEWEST_MINOR = 11, 15
-"""The versions 3.x of Python that are looked for."""
 BUILD = "import sys; from setuptools import build_meta; build_meta.build_{kind}(sys.argv[1])"
 WRITE = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
 
@@ -43,7 +41,7 @@ class Source:
     resolution: str | None = None
 
     def __str__(self) -> str:
-        return f"{Path(self.interpreter or 'python').name}-{self.resolution or 'linked'}"
+        return f"{self.interpreter or 'python'}-{self.resolution or 'linked'}"
 
 
 @dataclass(frozen=True)
@@ -74,12 +72,15 @@ class Environment:
         Args:
             command: its words, with the name of a program of the environment as the first one.
             path: what follows the programs of the environment on PATH.
-            environ: more variables. There is no HOME.
+            environ: more variables. A stranger has no HOME, and the user of the tests one that is not there.
         """
         first, *rest = map(str, command)
         settings = {name: str(value) for name, value in environ.items()}
         settings["PATH"] = f"{self.folder / 'bin'}{os.pathsep}{path}"
-        identity = {} if self.user is None else {"user": self.user, "group": self.user, "extra_groups": []}
+        if self.user is None:
+            identity, settings = {}, {"HOME": str(self.folder / "home")} | settings
+        else:
+            identity = {"user": self.user, "group": self.user, "extra_groups": []}
         words = [str(self.folder / "bin" / first), *rest]
         return subprocess.run(
             words, cwd=self.work, env=settings, capture_output=True, text=True, check=False, **identity
@@ -109,10 +110,9 @@ def _made(kind: str, tree: Path, place: Path, pattern: str) -> Path:
     return next(place.glob(pattern))
 
 
-def sources() -> list[Source]:
-    """Return what `make matrix` installs: the oldest and the newest packages, for every Python that there is."""
-    names = [f"python3.{minor}" for minor in range(OLDEST_MINOR, NEWEST_MINOR + 1)]
-    found = [path for path in map(shutil.which, names) if path] or [sys.executable]
+def sources(interpreters: Iterable[str]) -> list[Source]:
+    """Return the oldest and the newest packages of each Python that is there and starts."""
+    found = [path for path in map(shutil.which, interpreters) if path and _starts(path, None)]
     return [Source(each, resolution) for each in found for resolution in ("lowest-direct", "highest")]
 
 
