@@ -62,7 +62,7 @@ PYTEST = $(RUN) pytest -n $(if $(filter 1 2 3 4 5 6 7,$(CORES)),$$(($(CORES) + 1
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures panel browser screenshots verilog docs diagrams results digests soak fuzz matrix lock clean distclean help tools FORCE
+.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures panel browser screenshots verilog docs diagrams results digests soak fuzz matrix release lock clean distclean help tools FORCE
 
 all: $(REPORTS) $(PICTURES) $(TWO_RATES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
@@ -165,6 +165,9 @@ fuzz: $(VENV)/.test | tools ## 20 000 hostile calls of the command line, and 200
 
 matrix: $(VENV)/.test | tools ## the wheel with each extra, installed elsewhere: oldest and newest packages, every Python (half an hour)
 	@HARDWALL_MATRIX="$(PYTHONS)" $(RUN) pytest -n 0 -o faulthandler_timeout=0 tests/test_installed.py $(ARGS)
+
+release: $(VENV)/.test $(VENV)/.synth $(VENV)/.docs | tools ## wheel, sdist, Verilog of every scene, pages, licences and sums, in build/release/ (some minutes)
+	@$(IN_TESTS) support.release
 
 # Names, versions and hashes; no address of an index, which is for each machine to say. What is in it stays, unless
 # pyproject.toml no longer allows it or ARGS="--upgrade" asks for newer ones.

@@ -17,7 +17,8 @@ import pytest
 
 from hardwall.cli.group import COMMANDS
 from support import environments, virtual_boards
-from support.environments import ROOT, Environment, Source
+from support.archives import ROOT
+from support.environments import Environment, Source
 from support.pages import Block, blocks
 
 MATRIX = environments.sources(os.environ.get("HARDWALL_MATRIX", "").split())

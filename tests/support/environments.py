@@ -20,7 +20,8 @@ from pathlib import Path
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-ROOT = Path(__file__).absolute().parents[2]
+from .archives import ROOT, commit_time_s, normalise
+
 STRANGER = 54321
 """A user of whom the system knows nothing: without a name, a home or a file."""
 BUILD = "import sys; from setuptools import build_meta; build_meta.build_{kind}(sys.argv[1])"
@@ -88,10 +89,14 @@ class Environment:
 
 
 def built(folder: Path) -> tuple[Path, Path]:
-    """Return the sdist, and the wheel that is built from it; both are made in a folder, of a copy of the tree."""
+    """Return the sdist, and the wheel that is built from it; both are made in a folder, of a copy of the tree.
+
+    They are the same bytes whenever they are made of the same commit.
+    """
     tree = folder / "tree"
     shutil.copytree(ROOT, tree, ignore=_of_no_package)
     sdist = _made("sdist", tree, folder / "dist", "*.tar.gz")
+    normalise(sdist)
     with tarfile.open(sdist) as archive:
         archive.extractall(folder, filter="data")
     return sdist, _made("wheel", folder / sdist.name.removesuffix(".tar.gz"), folder / "dist", "*.whl")
@@ -105,7 +110,8 @@ def _of_no_package(folder: str, names: list[str]) -> set[str]:
 
 def _made(kind: str, tree: Path, place: Path, pattern: str) -> Path:
     command = [sys.executable, "-c", BUILD.format(kind=kind), str(place)]
-    done = subprocess.run(command, cwd=tree, capture_output=True, text=True, check=False)
+    settings = os.environ | {"SOURCE_DATE_EPOCH": str(commit_time_s())}
+    done = subprocess.run(command, cwd=tree, env=settings, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return next(place.glob(pattern))
 
