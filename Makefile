@@ -1,13 +1,14 @@
 # Every task of the project; `make help` lists them. Paths here are relative, so that `make -C` works from anywhere.
 #
 #   PYTHON=python3.13         another interpreter; .venv is made anew when it changes
-#   ARGS="-k levant"          more options for pytest (test, soak, fuzz)
+#   ARGS="-k levant"          more options for pytest (test, soak, fuzz, matrix), or for uv (lock)
 #   ONLY=hit/mhz              the beginning of the names of the cases to record anew (digests), or of what is checked
 #                             (prove, faults, gate, coverage, mutate); the reports to make (results)
 #   LIST=1                    only say which reports are stale (results)
 #   AGAIN=1                   find anew what is kept in tests/signoff/findings/ (the same five)
 #   SEEDS="1 2" SAMPLES=10000 ENDURANCE=1000000
 #                             the seeds, the samples for every seed, and the samples of endurance (soak)
+#   PYTHONS="python3.12"      the interpreters to install for (matrix); those that are not there are left out
 #   CALLS=1000 KILLS=16       the hostile calls, and the runs that are ended (fuzz)
 
 SHELL := /bin/bash
@@ -54,13 +55,14 @@ SAMPLES ?= 1000000
 ENDURANCE ?= 1000000000
 CALLS ?= 20000
 KILLS ?= 200
+PYTHONS ?= python3.11 python3.12 python3.13 python3.14 python3.15
 # Up to 8 cores, one process more than there are, because some tests wait.
 CORES = $(shell getconf _NPROCESSORS_ONLN)
 PYTEST = $(RUN) pytest -n $(if $(filter 1 2 3 4 5 6 7,$(CORES)),$$(($(CORES) + 1)),8) --dist worksteal
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures panel browser screenshots verilog docs diagrams results digests soak fuzz clean distclean help tools FORCE
+.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures panel browser screenshots verilog docs diagrams results digests soak fuzz matrix release lock clean distclean help tools FORCE
 
 all: $(REPORTS) $(PICTURES) $(TWO_RATES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
@@ -161,6 +163,18 @@ soak: $(VENV)/.test | tools ## 10^9 samples of every estimator, every digest, ev
 fuzz: $(VENV)/.test | tools ## 20 000 hostile calls of the command line, and 200 runs ended at random times (an hour or two)
 	@HARDWALL_FUZZ=$(CALLS) HARDWALL_KILLS=$(KILLS) $(PYTEST) tests/test_fuzz.py tests/test_killed.py $(ARGS)
 
+matrix: $(VENV)/.test | tools ## the wheel with each extra, installed elsewhere: oldest and newest packages, every Python (half an hour)
+	@HARDWALL_MATRIX="$(PYTHONS)" $(RUN) pytest -n 0 -o faulthandler_timeout=0 tests/test_installed.py $(ARGS)
+
+release: $(VENV)/.test $(VENV)/.synth $(VENV)/.docs | tools ## wheel, sdist, Verilog of every scene, pages, licences and sums, in build/release/ (some minutes)
+	@$(IN_TESTS) support.release
+
+# Names, versions and hashes; no address of an index, which is for each machine to say. What is in it stays, unless
+# pyproject.toml no longer allows it or ARGS="--upgrade" asks for newer ones.
+lock: $(VENV)/.made | tools ## write requirements.lock anew: the exact versions that make installs, of pyproject.toml's ranges
+	@$(UV) pip compile --quiet --universal --python-version 3.11 --all-extras --generate-hashes --no-annotate \
+	  --custom-compile-command 'make lock' $(ARGS) --output-file $(LOCK) pyproject.toml
+
 clean: ## remove what was built and cached
 	rm -rf build .hypothesis .pytest_cache .ruff_cache
 	find cli hdl host model sim tests -name __pycache__ -prune -exec rm -rf {} +
@@ -210,41 +224,52 @@ INTERPRETER := $(if $(STALE),$(PYTHON),$(VENV)/bin/python)
 
 $(VENV)/.made: $(if $(STALE),FORCE) | tools
 	@"$(PYTHON)" -m venv $(if $(MADE_IN),--clear) $(VENV)
+	@$(PIP) install --quiet --require-hashes --requirement <(sed -n '/^uv==/,/[^\]$$/p' $(LOCK)) 2>$(VENV)/uv.log || true
 	@printf '%s\n' "$(PYTHON)" >$(VENV)/.python
 	@printf '%s\n' "$(CURDIR)" >$@
 
-# Only one pip runs at a time, even in a parallel make; of its output, only the names of the packages are shown. Yosys and
-# the placers compile themselves when they run first, into a file of the user's which all runs read: two first runs at a
-# time would break each other, so they have theirs here.
-SAYS := s/^Collecting \([^ ]*\).*/  \1/p; s/^Installing collected packages.*/  unpacking all of these/p
+# Every version is that of $(LOCK), whose hashes uv checks. Where uv is not to be had, or finds no package, pip takes its
+# place: it checks no hash, for it cannot where a tree is installed in place. Only one installer runs at a time, even in a
+# parallel make; of its output, only the large packages and the end are shown. Yosys and the placers compile themselves
+# when they run first, into a file of the user's which all runs read: two first runs at a time would break each other, so
+# they have theirs here.
+LOCK := requirements.lock
+UNHASHED := sed '/--hash/d; s/ *\\$$//' $(LOCK) >$(VENV)/constraints.txt
+PIP := $(RUN) pip --disable-pip-version-check
+UV := $(VENV)/bin/uv
+SAYS := s/^Downloading \(.*\)/  \1/p; s/^Collecting \([^ ]*\).*/  \1/p; s/^Installed/  installed/p; \
+  s/^Installing collected packages.*/  unpacking all of these/p
 define install
-@echo "Installing into $(VENV), once: $(2) ..."; began=$$SECONDS; \
-  flock $(VENV)/.made $(RUN) pip install --disable-pip-version-check --progress-bar off --editable '.[$(1)]' \
-    | sed -un '$(SAYS)'; \
-  $(foreach tool,$(3),flock $(VENV)/.made $(VENV)/bin/yowasp-$(tool) --version >/dev/null 2>&1;) \
+@echo "Installing into $(VENV), once: $(2) ..."; began=$$SECONDS; exec {lock}<$(VENV)/.made; flock $$lock; \
+  by_uv() { [ -x $(UV) ] && $(UV) pip install --python $(VENV)/bin/python --constraint $(LOCK) \
+    --build-constraint $(LOCK) --editable '.[$(1)]' 2>&1 | tee $(VENV)/uv.log | sed -un '$(SAYS)'; }; \
+  by_pip() { $(UNHASHED); PIP_CONSTRAINT=$(VENV)/constraints.txt $(PIP) install --progress-bar off \
+    --editable '.[$(1)]' | sed -un '$(SAYS)'; }; \
+  if by_uv; then rm $(VENV)/uv.log; else tail -n 1 $(VENV)/uv.log 2>/dev/null || true; echo "  by pip, without uv:"; by_pip; fi; \
+  $(foreach tool,$(3),$(VENV)/bin/yowasp-$(tool) --version >/dev/null 2>&1;) \
   echo "  done in $$((SECONDS - began)) s"
 @touch $@
 endef
 
-$(VENV)/.sim: pyproject.toml $(VENV)/.made | tools
+$(VENV)/.sim: pyproject.toml $(LOCK) $(VENV)/.made | tools
 	$(call install,sim,the model and the loop)
 
-$(VENV)/.test: pyproject.toml $(VENV)/.sim | tools
+$(VENV)/.test: pyproject.toml $(LOCK) $(VENV)/.sim | tools
 	$(call install,sim$(comma)host$(comma)panel$(comma)test,the tests' tools,yosys)
 
-$(VENV)/.panel: pyproject.toml $(VENV)/.sim | tools
+$(VENV)/.panel: pyproject.toml $(LOCK) $(VENV)/.sim | tools
 	$(call install,sim$(comma)host$(comma)panel,the page)
 
-$(VENV)/.synth: pyproject.toml $(VENV)/.sim | tools
+$(VENV)/.synth: pyproject.toml $(LOCK) $(VENV)/.sim | tools
 	$(call install,sim$(comma)synth,place and route,yosys nextpnr-ecp5 nextpnr-ice40 nextpnr-himbaechel-gowin)
 
-$(VENV)/.docs: pyproject.toml $(VENV)/.sim | tools
+$(VENV)/.docs: pyproject.toml $(LOCK) $(VENV)/.sim | tools
 	$(call install,sim$(comma)host$(comma)panel$(comma)docs,the tools of the pages)
 
 # ---- system packages, checked before anything starts ----------------------------------------------------------------
 
 # These tasks embed Python in the simulator, by cocotb.
-EMBEDDED := $(filter test faults gate coverage mutate bench soak,$(MAKECMDGOALS))
+EMBEDDED := $(filter test faults gate coverage mutate bench soak matrix,$(MAKECMDGOALS))
 
 define CHECK_PYTHON
 import sys

@@ -49,13 +49,13 @@ def _run() -> tuple[int, str]:
         if not of_board and not isinstance(error, BadInput | InputError | BuildFolderError):
             raise
         return 2, f"the scene's {error}" if of_board else str(error)
-    except ModuleNotFoundError as error:
-        from .extras import extra_of  # noqa: PLC0415  (the list of what is installed is slow to import)
+    except ImportError as error:
+        from ..model.runtime import extras  # noqa: PLC0415  (the list of what is installed is slow to import)
 
-        extra = extra_of(error.name)
-        if extra is None:
+        message = extras.lacking(error)
+        if message is None:
             raise
-        return 1, f"{error.name} is not installed: it comes with pip install 'hardwall[{extra}]'"
+        return 1, message
     except streams.StdoutError as error:
         return error.code, str(error)
     except (RuntimeError, OSError, MemoryError) as error:

@@ -2,6 +2,8 @@
 
 import os
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 # Use the Yosys wheel that comes with Amaranth: the same version, and so the same text, on every machine.
@@ -15,6 +17,7 @@ from amaranth.lib.cdc import FFSynchronizer
 from hardwall.model import register_texts
 from hardwall.model.axes.axis import AxesSpec
 from hardwall.model.axis.registers import RegisterMap
+from hardwall.model.runtime.build_folder import home_for_tools
 from hardwall.model.runtime.whole_file import whole_file
 from hardwall.model.spec import AxisSpec
 
@@ -71,6 +74,18 @@ def _with_start(text: str) -> str:
     return text
 
 
+@contextmanager
+def _home_for_yosys() -> Iterator[None]:
+    """Give Yosys, which runs in a process of its own, a home where the user has none."""
+    given = home_for_tools()
+    os.environ.update(given)
+    try:
+        yield
+    finally:
+        for name in given:
+            del os.environ[name]
+
+
 def to_verilog(component: wiring.Component, name: str) -> str:
     """Return the Verilog of `component` as module `name`, with ports `clk` and `rst` besides its members.
 
@@ -78,14 +93,15 @@ def to_verilog(component: wiring.Component, name: str) -> str:
     Verilog-2005, and means the same where it is read as SystemVerilog. A memory with the attribute `NO_FIRST_CONTENTS`
     has no first contents.
     """
-    text = verilog.convert(component, name=name, platform=_AnyPart(), emit_src=False, strip_internal_attrs=True)
+    with _home_for_yosys():
+        text = verilog.convert(component, name=name, platform=_AnyPart(), emit_src=False, strip_internal_attrs=True)
     return _with_start(_CONTENTS.sub(r"\1", text))
 
 
 def to_netlist(component: wiring.Component, name: str) -> _nir.Netlist:
     """Return the netlist of `component` that `to_verilog` writes as text: Amaranth's own, before any tool has seen it.
 
-    Amaranth, whose version is pinned, has no public name for it.
+    Amaranth has no public name for it: its range in pyproject.toml ends before the next minor version.
     """
     ports = {
         "__".join(map(str, path)): (

@@ -1,5 +1,9 @@
 """What runs on the PC beside a board, real or virtual: `connect`, the axis in SI units, and what may go wrong."""
 
+from ..model.runtime.extras import need
+
+need("host")
+
 from .axis import Axis
 from .banks import Axes
 from .config import Config, Difference

@@ -16,7 +16,7 @@ from hardwall.model.axis import supervisor
 from hardwall.model.encoder import quadrature
 from support.pages import PAGES, ROOT, text_of
 
-pytest.importorskip("schemdraw", reason="schemdraw is not installed: pip install 'hardwall[docs]'")
+pytest.importorskip("schemdraw", reason="schemdraw is not installed: pip install '.[docs]'")
 
 FOLDER = ROOT / "docs" / "diagrams"
 FILES = sorted(path.name for path in FOLDER.glob("*.svg"))

@@ -1,4 +1,4 @@
-"""The layout of the project: directions of imports, three files a block, pinned versions, nothing of one machine."""
+"""The layout of the project: directions of imports, three files a block, ranges of versions, nothing of one machine."""
 
 import ast
 import importlib.metadata
@@ -11,6 +11,8 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
+
+from hardwall.model.runtime import extras
 
 ROOT = Path(__file__).absolute().parent.parent
 ROOMS = ("cli", "hdl", "host", "model", "sim")
@@ -86,6 +88,11 @@ MODULES = {module_of(path): path for path in SOURCES}
 def plain(name: str) -> str:
     """Return the name of a distribution in the form that package indexes compare."""
     return name.replace("_", "-").lower()
+
+
+def package_of(requirement: str) -> str:
+    """Return the name of the package that a requirement is of."""
+    return re.match(r"[\w-]+", requirement)[0]
 
 
 def imports(path: Path) -> Iterator[str]:
@@ -266,6 +273,48 @@ def test_an_import_of_the_model_touches_no_folder_and_asks_for_no_home():
     assert (done.returncode, done.stderr) == (0, "")
 
 
+WITHOUT_POSIX = """
+import importlib, os, signal, socket, sys
+# What others import of POSIX here, they do not import there.
+import asyncio, fastapi, nicegui, numba, pymodbus.client, serial, uvicorn
+for name in ("fcntl", "grp", "pty", "pwd", "resource", "termios", "tty"):
+    sys.modules[name] = None
+for module, names in (
+    (os, "fork getuid geteuid killpg mkfifo setsid uname O_NONBLOCK"),
+    (signal, "SIGALRM SIGHUP SIGKILL SIGPIPE pthread_sigmask setitimer"),
+    (socket, "AF_UNIX SOCK_SEQPACKET SO_PEERCRED"),
+):
+    for name in names.split():
+        delattr(module, name)
+for name in sys.argv[1:]:
+    importlib.import_module(name)
+from hardwall.host import PortError, connect
+from hardwall.model.axis import Axis
+from hardwall.model.spec import AxisSpec
+spec = AxisSpec(
+    clock_hz=1_000_000, sample_hz=10_000, actuation_hz=10_000, count_m=1e-6, travel_m=0.1, speed_max_m_per_s=1.0,
+    acceleration_max_m_per_s2=10.0, force_max_n=10.0, force_resolution_n=1e-3, stiffness_max_n_per_m=1e3,
+    damping_max_n_s_per_m=10.0, estimator="fdm",
+)
+print(Axis(spec, wall_stiffness=1e3).run([0, 20, 40, 60]).force.tolist())
+try:
+    connect("tcp://127.0.0.1:1")
+except PortError as error:
+    print(error)
+"""
+
+
+def test_model_and_host_work_where_there_is_no_posix():
+    """On Windows only the simulation and its boards do not run."""
+    modules = sorted(name for name in MODULES if name.startswith(("hardwall.model", "hardwall.host")))
+    command = [sys.executable, "-c", WITHOUT_POSIX, *(name for name in modules if not name.endswith("__main__"))]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    forces, refused = done.stdout.splitlines()
+    assert forces == "[0, -20, -40, -60]"
+    assert refused.startswith("tcp://127.0.0.1:1 cannot be opened: ")
+
+
 def test_the_model_needs_only_numpy_and_numba():
     modules = sorted(name for name in MODULES if name.startswith("hardwall.model"))
     program = f"import sys, {', '.join(modules)}; print(*sys.modules)"
@@ -276,11 +325,32 @@ def test_the_model_needs_only_numpy_and_numba():
     assert "numba" in loaded
 
 
-def test_versions_are_pinned():
+def requirements() -> list[str]:
+    """Return every requirement of the project, and of its build."""
     lists = [CONFIG["build-system"]["requires"], CONFIG["project"]["dependencies"], *EXTRAS.values()]
-    requirements = [requirement for one in lists for requirement in one]
-    assert len(requirements) > len(lists)
-    assert [each for each in requirements if not re.fullmatch(r"[A-Za-z0-9-]+==[0-9][0-9a-z.]*", each)] == []
+    return [requirement for one in lists for requirement in one if not requirement.startswith("hardwall[")]
+
+
+def test_versions_are_ranges():
+    """Of one form, for the program itself reads it."""
+    form = re.compile(r"[A-Za-z0-9-]+>=[0-9][0-9.]*(,<[0-9][0-9.]*)?")
+    assert len(requirements()) > 50
+    assert [each for each in requirements() if not form.fullmatch(each)] == []
+
+
+def test_a_package_has_one_range():
+    ranges = {
+        name: {each for each in requirements() if package_of(each) == name} for name in map(package_of, requirements())
+    }
+    assert {name: spans for name, spans in ranges.items() if len(spans) > 1} == {}
+
+
+def test_the_lock_has_a_version_in_every_range_with_its_hashes_and_no_address():
+    lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+    locked = dict(re.findall(r"^([a-z0-9.-]+)==([^ ]+).*\\\n    --hash=sha256:[0-9a-f]{64}", lock, re.M))
+    assert "://" not in lock
+    bounds = {package_of(each): tuple(each.removeprefix(package_of(each)).split(",")) for each in requirements()}
+    assert {name for name, span in bounds.items() if not extras._within(locked.get(plain(name), "0"), span)} == set()
 
 
 @pytest.mark.parametrize("path", [*SOURCES, *TESTS], ids=identity)
@@ -288,9 +358,9 @@ def test_what_is_imported_is_what_its_extra_installs(path):
     for_tests = path in TESTS or path.stem.startswith("cocotb_")
     room = path.relative_to(ROOT).parts[0]
     of_room = {"model": [], "host": ["host", "panel"], "cli": ["sim", "host"]}
-    extras = of_room.get(room, ["sim", "data", "host", "panel", "test"] if for_tests else ["sim", "data"])
-    pinned = [CONFIG["project"]["dependencies"], *(EXTRAS[extra] for extra in extras)]
-    installed = {plain(requirement.partition("==")[0]) for one in pinned for requirement in one}
+    of_it = of_room.get(room, ["sim", "data", "host", "panel", "testing", "test"] if for_tests else ["sim", "data"])
+    lists = [CONFIG["project"]["dependencies"], *(EXTRAS[extra] for extra in of_it)]
+    installed = {plain(package_of(requirement)) for one in lists for requirement in one}
     installed.add("llvmlite")  # a dependency of Numba
     pages = (page.stem for page in (ROOT / "docs").glob("*.py"))
     ours = {"hardwall", *pages, *(test.stem for test in TESTS), *(test.parent.name for test in TESTS)}

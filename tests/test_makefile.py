@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).absolute().parent.parent
 MAKE = shutil.which("make")
-NEEDED = ["Makefile", "pyproject.toml"]
+NEEDED = ["Makefile", "pyproject.toml", "requirements.lock"]
 PACKAGES = {"python3": "python3", "c++": "g++", "perl": "perl"}
 
 

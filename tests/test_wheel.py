@@ -1,16 +1,12 @@
 """The wheel: it has every package and file of the tree, and every module in it can be imported somewhere else."""
 
-import os
-import shutil
-import subprocess
-import sys
-import sysconfig
-import venv
 import zipfile
 from pathlib import Path
 
 import pytest
 from test_layout import CONFIG, EXTRAS, MODULES, ROOT
+
+from support import environments
 
 FOLDERS = {name.partition(".")[2]: folder for name, folder in CONFIG["tool"]["setuptools"]["package-dir"].items()}
 """The folder in the tree of each package below hardwall."""
@@ -24,19 +20,8 @@ for name in sys.argv[1:]:
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory) -> Path:
-    """Return the wheel, made of a copy of the tree, for a build leaves files in the tree."""
-    copied = tmp_path_factory.mktemp("tree")
-    for name in ("pyproject.toml", "README.md", "LICENSE", *FOLDERS.values()):
-        if (ROOT / name).is_dir():
-            shutil.copytree(ROOT / name, copied / name, ignore=shutil.ignore_patterns("__pycache__"))
-        else:
-            shutil.copy(ROOT / name, copied / name)
-    program = "import sys; from setuptools.build_meta import build_wheel; build_wheel(sys.argv[1])"
-    done = subprocess.run(
-        [sys.executable, "-c", program, "dist"], cwd=copied, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    return next((copied / "dist").glob("*.whl"))
+    """Return the wheel, built from the sdist."""
+    return environments.built(tmp_path_factory.mktemp("built"))[1]
 
 
 def in_tree() -> set[str]:
@@ -66,24 +51,14 @@ def test_the_wheel_has_every_file_of_the_tree(wheel):
     assert len(inside) > len(MODULES)
 
 
-def test_every_module_of_the_wheel_is_imported_in_an_empty_environment_elsewhere(wheel, tmp_path):
-    """Its requirements are those of this environment, by a path: so nothing of this tree is found."""
-    place = tmp_path / "environment"
-    venv.create(place, with_pip=False, symlinks=True)
-    paths = {"base": str(place), "platbase": str(place)}
-    packages = Path(sysconfig.get_path("purelib", "venv", paths))
-    with zipfile.ZipFile(wheel) as archive:
-        archive.extractall(packages)
-    here = [sysconfig.get_path("purelib"), sysconfig.get_path("platlib")]
-    (packages / "requirements.pth").write_text("\n".join(dict.fromkeys(here)), encoding="utf-8")
+def test_every_module_of_the_wheel_is_imported_in_an_environment_elsewhere(wheel):
+    """The packages of all extras are there."""
     modules = sorted(name for name in MODULES if MODULES[name].stem != "__main__")
-    python = Path(sysconfig.get_path("scripts", "venv", paths)) / "python"
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    done = subprocess.run(
-        [python, "-c", PROGRAM, *modules], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
+    with environments.environment(environments.Source(), wheel, "sim", "host", "panel", "testing") as environment:
+        done = environment.run("python", "-c", PROGRAM, *modules)
+        assert done.returncode == 0, done.stderr
 
 
-def test_the_tests_build_with_the_versions_of_a_user():
-    assert CONFIG["build-system"]["requires"] == [each for each in EXTRAS["test"] if each.startswith("setuptools==")]
+def test_the_build_needs_what_the_tests_build_with():
+    (needed,) = CONFIG["build-system"]["requires"]
+    assert needed in EXTRAS["test"]

@@ -56,6 +56,14 @@ def _for_this_process() -> Path:
     return Path(folder)
 
 
+def home_for_tools() -> dict[str, str]:
+    """Return the variable that makes the build folder the home of a tool, where the user has none; else nothing.
+
+    Yosys, the placers and ccache keep what they compile below the home, and do not start without one.
+    """
+    return {} if os.path.expanduser("~") != "~" else {"HOME": str(build_dir())}
+
+
 def warn_once(kind: str, message: str) -> None:
     """Log a warning, unless this process has logged one of its kind; a worker leaves that to the process it works for.
 

@@ -1,8 +1,9 @@
 """How kernels are compiled: one plain Python source for a single step, a long record, many lanes and the closed loop.
 
 `compiled` is `numba.njit` with a disk cache that follows the *content* of the whole project, so that no edit of a
-callee in another file leaves the old arithmetic in place: see `kernel_cache`. With `NUMBA_DISABLE_JIT=1` the same
-functions run as ordinary Python.
+callee in another file leaves the old arithmetic in place: see `kernel_cache`. The cache leans on the inside of Numba:
+with a version that it was not tested with, kernels are compiled by every process, and one line says so. With
+`NUMBA_DISABLE_JIT=1` the same functions run as ordinary Python.
 
 `by_type` is the one place where a kernel picks its variant: a function with several bodies, chosen by the type of its
 first argument, at compile time inside compiled code. A variant that a run does not use is not in its machine code.
@@ -17,8 +18,13 @@ from numba.core import config, types
 from numba.core.typing.templates import AbstractTemplate, infer_global
 
 from . import provenance
-from .kernel_cache import KernelCache
+from .build_folder import warn_once
+from .extras import need
 
+need(None)
+
+CACHED = (0, 60), (0, 68)
+"""The first and the last version of Numba with which compiled code is kept: `make matrix` runs both."""
 Kernel = TypeVar("Kernel", bound=Callable)
 
 
@@ -37,9 +43,22 @@ def _jit(function: Kernel, folder: str, **options: Any) -> Any:
     Python code of other threads runs beside a kernel.
     """
     kernel = numba.njit(error_model="numpy", nogil=True, **options)(function)
-    if not cast(Any, config).DISABLE_JIT:
+    if not cast(Any, config).DISABLE_JIT and _is_cached():
+        from .kernel_cache import KernelCache  # noqa: PLC0415  (another Numba need not have what this imports)
+
         kernel._cache = KernelCache(function, folder)
     return kernel
+
+
+def _is_cached() -> bool:
+    """Return whether compiled code is kept with this version of Numba; otherwise a warning says that it is not."""
+    first, last = CACHED
+    version = numba.version_info.short
+    if first <= version <= last:
+        return True
+    span = f"{first[0]}.{first[1]} to {last[0]}.{last[1]}"
+    warn_once("numba", f"compiled code is kept with Numba {span}, not with {numba.__version__}: each run compiles anew")
+    return False
 
 
 def _kernel(function: Kernel, into_caller: bool) -> Kernel:

@@ -98,7 +98,7 @@ class Build:
         """Build it, if that is not done yet; return what runs it.
 
         Raises:
-            BuildError: if make cannot work there.
+            BuildError: if the system lacks a tool, or make cannot work there.
             RuntimeError: if Verilator or the compiler fails.
         """
         check_paths(self.folder)

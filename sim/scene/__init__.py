@@ -1,5 +1,9 @@
 """Scenes: devices described in TOML, and what is built from them."""
 
+from ...model.runtime.extras import need
+
+need("sim")
+
 from ...model.spec import AxisSpec
 from .load import load
 

@@ -8,6 +8,10 @@ of inputs through it, and `check` compares the outputs with the model's by `==`.
 random campaigns.
 """
 
+from hardwall.model.runtime.extras import need
+
+need("testing")
+
 from .bench import Bench
 from .recorded import Recorded, play
 from .simulator import CAMPAIGN, SAMPLES, SEED, parameters, rng, simulate

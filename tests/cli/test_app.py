@@ -36,6 +36,14 @@ main()
 """
 
 
+def comes_with(extra: str) -> str:
+    """Return what brings an extra: hardwall is on no package index."""
+    return (
+        f"it comes with pip install '.[{extra}]' in the checkout of hardwall, "
+        f"or with pip install 'WHEEL[{extra}]' of its wheel"
+    )
+
+
 def without(absent: set[str], *arguments: str) -> subprocess.CompletedProcess:
     """Run the command line as if some packages were not installed."""
     program = WITHOUT.format(absent=absent, arguments=arguments)
@@ -113,7 +121,7 @@ def test_an_option_is_refused_with_the_extra_host_alone(name):
 
 def test_what_cannot_be_drawn_is_said_before_a_board_is_asked():
     done = without({"matplotlib"}, "capture", "nowhere", "--plot", "capture.png")
-    message = "hardwall: error: matplotlib is not installed: it comes with pip install 'hardwall[sim]'\n"
+    message = f"hardwall: error: matplotlib is not installed: {comes_with('sim')}\n"
     assert (done.returncode, done.stdout, done.stderr) == (1, "", message)
 
 
@@ -187,7 +195,7 @@ def test_a_current_folder_that_was_removed_is_said_in_a_line(tmp_path):
         ("rich", ("hit",), "rich", "sim"),
         ("pydantic", ("hit",), "pydantic", "sim"),
         ("scipy", ("lipschitz",), "scipy", "sim"),
-        ("cocotb", ("bench",), "cocotb", "test"),
+        ("cocotb", ("bench",), "cocotb", "testing"),
         ("pymodbus", ("panel", "virtual"), "pymodbus", "host"),
         ("nicegui", ("panel", "virtual"), "nicegui", "panel"),
     ],
@@ -197,9 +205,7 @@ def test_an_extra_that_is_not_installed_is_named_in_a_line(absent, arguments, na
     assert (done.returncode, done.stdout) == (1, "")
     package = done.stderr.removeprefix("hardwall: error: ").split(" ")[0]
     assert package.partition(".")[0] == named
-    assert (
-        done.stderr == f"hardwall: error: {package} is not installed: it comes with pip install 'hardwall[{extra}]'\n"
-    )
+    assert done.stderr == f"hardwall: error: {package} is not installed: {comes_with(extra)}\n"
 
 
 def test_what_comes_with_no_extra_is_a_fault_of_ours():

