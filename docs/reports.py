@@ -120,8 +120,9 @@ def sources_of(command: str) -> list[Path]:
             seen.add(file)
             package = ".".join(["hardwall", *file.relative_to(TREE).parent.parts])
             waiting += (found for name in imported(file.read_bytes(), package) for found in _files(name))
-    # Of the command line the command alone has defaults that matter.
-    return sorted(file for file in seen if file == own or not any(file.is_relative_to(TREE / room) for room in others))
+    # A package passes names on, and of the command line the command alone has defaults that matter.
+    named = (file for file in seen if file.name != "__init__.py")
+    return sorted(file for file in named if file == own or not any(file.is_relative_to(TREE / room) for room in others))
 
 
 @functools.cache
