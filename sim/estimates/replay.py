@@ -33,7 +33,7 @@ from ..recordings.recording import EdgeRecord, Recording
 from .captured import CLOCK_MAX_HZ, closest_s, coarse, position_counts, run_edges, with_clock
 from .reference import REFERENCE_HZ, SETTLE_S, acceleration_bound, judged_from, zero_phase_velocity
 from .replay_axis import SECOND, axis_spec, least_bound, needs_pins, run
-from .settings import Settings, applied, power_of
+from .settings import Settings, applied, in_counts, power_of
 from .through_pins import GLITCH_CLOCKS
 
 COARSEN_MAX = (1 << 31) - 1
@@ -383,6 +383,5 @@ def replay(
 def _gains(spec: AxisSpec, rate_hz: float) -> dict[str, float]:
     """Return the gains of an axis by name, in counts and true seconds."""
     return {
-        name.replace("_m_", "_counts_"): value * (rate_hz / SECOND) ** power_of(name)
-        for name, value in vars(spec.design.gains).items()
+        in_counts(name): value * (rate_hz / SECOND) ** power_of(name) for name, value in vars(spec.design.gains).items()
     }
