@@ -3,7 +3,8 @@
 import pytest
 
 from hardwall.model.estimators.registry import ESTIMATORS
-from hardwall.sim.estimates.replay import ArgumentError, replay
+from hardwall.sim.estimates.replay import replay
+from hardwall.sim.estimates.replay_plan import ArgumentError
 from hardwall.sim.estimates.settings import SettingError, Settings, names_of, settings_of
 from stimuli.replays import BOUND, COARSEN, recording, swing
 
