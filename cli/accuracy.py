@@ -8,7 +8,7 @@ import typer
 
 from ..sim.estimates import figures, signals
 from ..sim.estimates.accuracy import PHASE, errors_of
-from ..sim.estimates.replay import ReplayError
+from ..sim.estimates.replay_plan import ReplayError
 from ..sim.jobs.store import Store
 from ..sim.studies import accuracy
 from .errors import BadInput

@@ -14,7 +14,7 @@ from .terminal import hear_stages
 
 COMMANDS = {
     "hit": "Hit the wall: the founding paper's protocol, and whether the wall is stable.",
-    "replay": "Put recorded counts through an estimator; the RTL gets them through its pins.",
+    "replay": "Put recorded counts, or captured edges, through an estimator; the RTL gets them through its pins.",
     "table": "Print reports of hits side by side.",
     "bench": "Measure the closed loop's speed on every backend and under cocotb, and what optional parts cost.",
     "verilog": "Write the axis of a scene as Verilog, with a table of its ports.",

@@ -24,8 +24,16 @@ CHANNELS = 2, 3
 
 @dataclass(frozen=True, kw_only=True)
 class ReadingOptions(StudyOptions):
-    """The options of a recording; those of a study come with them."""
+    """The options of a recording; those of a study come with them, with the keys of a replay in place of a scene's."""
 
+    set_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="controller.KEY=VALUE",
+            help="gains.ESTIMATOR.NAME, jerk_max_counts_per_s3 or edge_error_max_counts, as a scene's in counts",
+        ),
+    ] = None
     rate: Annotated[
         float | None, typer.Option(metavar="HZ", help="sample rate of a recording", show_default="from its times")
     ] = None

@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from ..sim.estimates import replay
+from ..sim.estimates import replay_plan
+from ..sim.estimates.replay import replay
 from ..sim.estimates.settings import SettingError, settings_of
 from .errors import BadInput
 from .options import BackendOption, Estimator, OutputOption, output_file
@@ -33,7 +34,7 @@ def command(
         typer.Option(help="the column of counts, by name or number", show_default="edges of a capture"),
     ] = None,
     coarsen: Annotated[
-        int, typer.Option(min=1, max=replay.COARSEN_MAX, help="divide the counts, and judge against the full ones")
+        int, typer.Option(min=1, max=replay_plan.COARSEN_MAX, help="divide the counts, and judge against the full ones")
     ] = 1,
     estimator: Annotated[Estimator, typer.Option(help="velocity estimator")] = "levant",
     output: OutputOption = None,
@@ -52,10 +53,10 @@ def command(
     recorded = options.read(file, column)
     try:
         with progress(f"{file.name} {estimator} {backend}", len(recorded.counts)) as advance:
-            result = replay.replay(recorded, estimator, output, backend, coarsen, acceleration_max, advance, settings)
-    except replay.ArgumentError as error:
+            result = replay(recorded, estimator, output, backend, coarsen, acceleration_max, advance, settings)
+    except replay_plan.ArgumentError as error:
         raise BadInput(f"{OPTIONS[error.argument]} {error.said}") from None
-    except replay.ReplayError as error:
+    except replay_plan.ReplayError as error:
         raise BadInput(str(error)) from None
     say(recorded)
     options.finish(result, {"velocities": (out, result.save)} if out else {})

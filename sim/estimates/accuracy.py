@@ -24,7 +24,8 @@ from . import learning, signals
 from .judge import Judge
 from .motions import velocity
 from .playback import velocities
-from .replay import check_length, replay
+from .replay import replay
+from .replay_plan import check_length
 
 RATES_HZ = (1_000, 10_000_000)
 """The slowest and the fastest rate that is measured."""

@@ -2,12 +2,8 @@
 
 With `coarsen` = N the estimator sees counts // N, and everything that is reported is in recorded counts and true
 seconds, whatever N is. The floor puts coarse counts (N - 1) / 2 recorded counts too low on average; the offset is
-constant, so it adds no velocity. The axis is described in `replay_axis`.
-
-The bound C on the acceleration, from which an estimator gets its gains, is computed by `reference` unless it is given.
-A recording that hardly accelerates gets a C that moves one count over its whole length, which the counts cannot
-distinguish from no acceleration, or the least C that the words can hold with its travel and speed
-(`model.motion.ACCELERATION_RANGE`). A change too fast for the pins at a clock of `CLOCK_MAX_HZ` is an error.
+constant, so it adds no velocity. The axis is described in `replay_axis`, and what is derived and checked before a run in
+`replay_plan`.
 
 A capture of edges has real stamps: where the counts go through pins, its own edges do (`captured`). An estimate is
 judged after the first second; of a capture, which may be shorter, at most its first quarter is left out.
@@ -18,50 +14,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
-from ...model.checks import NUMBERS, shown
-from ...model.encoder.quadrature_speed import max_edge_rate
-from ...model.estimators import registry
-from ...model.motion import least_acceleration
-from ...model.record_axis import GLITCH_CLOCKS
-from ...model.record_time import SECOND, RecordTime
+from ...model.record_time import RecordTime
 from ...model.runtime.result import Summary
 from ...model.runtime.whole_file import whole_file
 from ...model.spec import AxisSpec
-from ..loop.backends import BACKENDS, is_exact
-from ..recordings.recording import EdgeRecord, Recording
-from .captured import CLOCK_MAX_HZ, closest_s, coarse, position_counts, run_edges, with_clock
-from .reference import REFERENCE_HZ, SETTLE_S, acceleration_bound, judged_from, zero_phase_velocity
-from .replay_axis import axis_spec, needs_pins, run
-from .settings import Settings, applied
-
-COARSEN_MAX = (1 << 31) - 1
-EDGES_MAX = 1 << 24
-"""The most edges in a sample that go through the pins: all of them are in memory."""
-
-
-DERIVED = Settings()
-"""The settings that all follow from C."""
-
-
-class ReplayError(ValueError):
-    """A replay that is refused: one line with what is wrong and what is accepted."""
-
-
-class ArgumentError(ReplayError):
-    """An argument of `replay` that is refused: the message begins with its name.
-
-    Attributes:
-        argument: the name of the argument.
-        said: the message behind it.
-    """
-
-    def __init__(self, argument: str, said: str):
-        super().__init__(f"{argument} {said}")
-        self.argument, self.said = argument, said
+from ..loop.backends import is_exact
+from ..recordings.recording import Recording
+from .captured import run_edges
+from .replay_axis import needs_pins, run
+from .replay_plan import DERIVED, check_names, first_judged, plan
+from .settings import Settings, in_counts
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +69,7 @@ class Replay(Summary):
     @property
     def judged_from(self) -> int:
         """The number of the first sample that is judged."""
-        return _judged_from(self.recording)
+        return first_judged(self.recording)
 
     @property
     def by_edges(self) -> bool:
@@ -183,150 +148,6 @@ class Replay(Summary):
             )
 
 
-def _one_of(name: str, value: object, accepted: tuple[str, ...], of: str = "") -> None:
-    if value not in accepted:
-        raise ArgumentError(name, f"{of}must be one of {', '.join(accepted)}, not {shown(value)}")
-
-
-def _check_speed(recording: Recording, counts: np.ndarray, count: int, taker: str) -> None:
-    """Raise ReplayError, naming the sample and who takes the counts, if a change is too fast for the pins."""
-    steps = np.abs(np.diff(counts))
-    most = min(max_edge_rate(CLOCK_MAX_HZ, GLITCH_CLOCKS) / recording.rate_hz, EDGES_MAX)
-    if steps.max() > most:
-        k = int(np.argmax(steps > most)) + 1
-        coarse = "" if count == 1 else f" of {count}"
-        raise ReplayError(
-            f"{recording.file}, column {recording.column}: {taker} the count must change by at most "
-            f"{int(most)}{coarse} in a sample at {recording.rate_hz:g} Hz (a clock of {CLOCK_MAX_HZ / 1e6:g} MHz, "
-            f"and {EDGES_MAX} edges), not by {steps[k - 1]} at sample {k}, {recording.time_s[k]:g} s"
-        )
-
-
-def _check_names(estimator: str, output: str | None, backend: str) -> str:
-    """Return the name of the output, the estimator's first for None; raise ReplayError if a name is unknown."""
-    _one_of("estimator", estimator, tuple(registry.ESTIMATORS))
-    outputs = registry.design_of(estimator).outputs
-    output = outputs[0] if output is None else output
-    _one_of("output", output, outputs, f"of {estimator} ")
-    _one_of("backend", backend, BACKENDS)
-    return output
-
-
-def _judged_from(recording: Recording) -> int:
-    """Return the number of the first sample that is judged."""
-    first = judged_from(recording.rate_hz)
-    return first if recording.edges is None else min(first, len(recording.counts) // 4)
-
-
-def check_length(recording: Recording) -> None:
-    """Raise ReplayError if no sample of a recording is judged."""
-    if len(recording.counts) <= _judged_from(recording):
-        raise ReplayError(
-            f"{recording.file}: must be longer than {SETTLE_S:g} s, after which the estimate is judged, "
-            f"not {len(recording.counts)} samples at {recording.rate_hz:g} Hz"
-        )
-
-
-def _check_numbers(recording: Recording, coarsen: object, bound: float | None) -> None:
-    """Raise ReplayError if a recording cannot be replayed with these numbers."""
-    rate = recording.rate_hz
-    if isinstance(coarsen, bool) or not (isinstance(coarsen, int) and 1 <= coarsen <= COARSEN_MAX):
-        raise ArgumentError("coarsen", f"must be a whole number of 1 to {COARSEN_MAX}, not {shown(coarsen)}")
-    least, most = (number * (rate / SECOND) ** 2 for number in NUMBERS)
-    if bound is not None and not least <= bound <= most:
-        said = f"must be {least:g} to {most:g} counts/s^2 at {rate:g} Hz, not {bound!r}"
-        raise ArgumentError("acceleration_max_counts_per_s2", said)
-
-
-def _counts_for(recording: Recording, count: int, estimator: str, backend: str) -> np.ndarray:
-    """Return the counts that the estimator sees; raise ReplayError if they go through pins and change too fast."""
-    counts = recording.counts // count
-    if recording.edges is not None:
-        _check_edges(recording, coarse(recording.edges, count))
-    elif needs_pins(estimator, backend):
-        _check_speed(recording, counts, count, "on rtl" if backend == "rtl" else f"for {estimator}, which times edges,")
-    return counts
-
-
-def _check_edges(recording: Recording, edges: EdgeRecord) -> None:
-    """Raise ReplayError if two edges fall into one clock."""
-    if closest_s(edges) * CLOCK_MAX_HZ < 1:
-        place = int(np.argmin(np.diff(edges.ticks))) + 1
-        raise ReplayError(
-            f"{recording.file}, column {recording.column}: edges must be at least {1e9 / CLOCK_MAX_HZ:g} ns apart (a "
-            f"clock of {CLOCK_MAX_HZ / 1e6:g} MHz), not {closest_s(edges) * 1e9:g} ns at "
-            f"{edges.ticks[place] / edges.tick_hz:g} s: if these are glitches, filter them in the capture"
-        )
-
-
-class Plan(NamedTuple):
-    """What is derived from a recording before its counts are run.
-
-    Attributes:
-        counts: the counts that the estimator sees.
-        reference_hz, reference_counts_per_s: cutoff of the reference, and the reference.
-        acceleration_max_counts_per_s2: the bound C that sets the gains.
-        spec: the axis.
-        edges: the edges that the estimator sees; None where it sees counts.
-    """
-
-    counts: np.ndarray
-    reference_hz: float
-    reference_counts_per_s: np.ndarray
-    acceleration_max_counts_per_s2: float
-    spec: AxisSpec
-    edges: EdgeRecord | None
-
-
-def plan(
-    recording: Recording,
-    estimator: str,
-    backend: str,
-    coarsen: int = 1,
-    acceleration_max_counts_per_s2: float | None = None,
-    settings: Settings = DERIVED,
-) -> Plan:
-    """Derive what a replay runs; the arguments are those of `replay`.
-
-    Raises:
-        ReplayError: in one line, what is refused and what is accepted.
-    """
-    rate, given = recording.rate_hz, acceleration_max_counts_per_s2
-    cutoff = min(REFERENCE_HZ, rate / 4)
-    _check_numbers(recording, coarsen, given)
-    counts = _counts_for(recording, coarsen, estimator, backend)
-    whole, edges = recording.edges, None
-    position = recording.counts if whole is None else position_counts(whole, rate, len(counts))
-    reference = zero_phase_velocity(position, rate, cutoff)
-    bound = given
-    if bound is None:
-        bound = max(acceleration_bound(reference, rate), least_acceleration(counts) * coarsen * rate**2)
-    try:
-        spec = axis_spec(counts, coarsen, bound / rate**2, estimator)
-    except ValueError as error:
-        raise _unfit(recording, estimator, bound, given is not None, error) from None
-    try:
-        spec = applied(spec, settings, rate)
-    except ValueError as error:
-        raise ArgumentError("settings", f"must give an axis (as if {SECOND} samples were a second): {error}") from None
-    if whole is not None and needs_pins(estimator, backend):
-        edges = coarse(whole, coarsen)
-        spec = with_clock(spec, edges, rate)
-    return Plan(counts, cutoff, reference, bound, spec, edges)
-
-
-def _unfit(recording: Recording, estimator: str, bound: float, given: bool, error: ValueError) -> ReplayError:
-    """Return the error of a bound C from which no gains follow."""
-    why = f"as if {SECOND} samples were a second: {error}"
-    if given:
-        said = f"must give gains that fit this recording ({why}), not {bound!r}"
-        return ArgumentError("acceleration_max_counts_per_s2", said)
-    return ReplayError(
-        f"{recording.file}, column {recording.column}: {estimator} cannot take this recording, for no gains "
-        f"fit its acceleration of {bound:g} counts/s^2 ({why})"
-    )
-
-
 def replay(
     recording: Recording,
     estimator: str = "levant",
@@ -353,7 +174,7 @@ def replay(
         ReplayError: in one line, what is refused and what is accepted.
         RuntimeError: if the RTL could not be built.
     """
-    output = _check_names(estimator, output, backend)
+    output = check_names(estimator, output, backend)
     rate = recording.rate_hz
     planned = plan(recording, estimator, backend, coarsen, acceleration_max_counts_per_s2, settings)
     counts, cutoff, reference, bound, spec, edges = planned
@@ -384,5 +205,4 @@ def replay(
 
 def _gains(spec: AxisSpec, rate_hz: float) -> dict[str, float]:
     """Return the gains of an axis by name, in counts and true seconds."""
-    named = RecordTime(rate_hz).named(spec.design.gains)
-    return {name.replace("_m_", "_counts_"): value for name, value in named.items()}
+    return {in_counts(name): value for name, value in RecordTime(rate_hz).named(spec.design.gains).items()}

@@ -5,6 +5,7 @@ Everything is in recorded counts and true seconds, by the keys that a scene has 
 `replay_axis`.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -75,8 +76,12 @@ def settings_of(changes: Mapping[str, Any], estimator: str) -> Settings:
 
 def names_of(estimator: str) -> dict[str, str]:
     """Return the gains of an estimator: the names that they have here, and those of its class."""
-    own = registry.design_of(estimator).gains_class.__annotations__
-    return {name.replace("_m_", "_counts_"): name for name in own}
+    return {in_counts(name): name for name in registry.design_of(estimator).gains_class.__annotations__}
+
+
+def in_counts(name: str) -> str:
+    """Return the name of a gain with counts in place of metres."""
+    return re.sub(r"_m(?=_|$)", "_counts", name)
 
 
 def applied(spec: AxisSpec, settings: Settings, rate_hz: float) -> AxisSpec:

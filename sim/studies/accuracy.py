@@ -5,7 +5,7 @@ from typing import Any
 
 from ...model.runtime.result import Table, table_of
 from ..estimates.accuracy import COARSEN, encoder_of, measure, measure_recording, said_of, spec_of
-from ..estimates.replay import check_length, plan
+from ..estimates.replay_plan import check_length, plan
 from ..jobs.parallel import Run
 from ..recordings.recording import Recording
 from ..walls.methods import Curve

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from hardwall.sim.estimates.captured import closest_s, coarse, position_counts
-from hardwall.sim.estimates.replay import ReplayError, check_length, replay
+from hardwall.sim.estimates.replay import replay
+from hardwall.sim.estimates.replay_plan import ReplayError, check_length
 from hardwall.sim.recordings.decoded import counts_at
 from hardwall.sim.recordings.recording import EdgeRecord, Recording
 

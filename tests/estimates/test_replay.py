@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from hardwall.model.estimators.registry import ESTIMATORS
-from hardwall.sim.estimates.replay import ReplayError, check_length, replay
+from hardwall.sim.estimates.replay import replay
+from hardwall.sim.estimates.replay_plan import ReplayError, check_length
 from hardwall.sim.pictures.replay import draw
 from hardwall.sim.pictures.style import SUFFIXES, save
 from hardwall.sim.recordings.load import load

@@ -3,7 +3,8 @@
 import pytest
 
 from hardwall.model.estimators.registry import ESTIMATORS
-from hardwall.sim.estimates.replay import ArgumentError, replay
+from hardwall.sim.estimates.replay import replay
+from hardwall.sim.estimates.replay_plan import ArgumentError
 from hardwall.sim.estimates.settings import SettingError, Settings, names_of, settings_of
 from stimuli.replays import BOUND, COARSEN, recording, swing
 
@@ -34,6 +35,14 @@ def test_jerk_and_edge_error_set_the_gains_that_follow_from_them():
     found = replay(swing(), "edge-kalman", None, "fixed", 1, BOUND, settings=settings_of(changes, "edge-kalman"))
     assert found.gains["edge_error_counts"] == 0.25
     assert found.gains["jerk_counts_per_s3"] == pytest.approx(3e6, rel=1e-12)
+    # The axis counts 1024 samples a second.
+    assert found.spec.jerk_max_m_per_s3 == pytest.approx(3e6 * 1.024**3, rel=1e-12)
+
+
+def test_no_gain_of_a_replay_is_in_metres():
+    names = [name for estimator in ESTIMATORS for name in names_of(estimator)]
+    assert "noise_rms_counts" in names
+    assert [name for name in names if name.endswith("_m") or "_m_" in name] == []
 
 
 @pytest.mark.parametrize(
