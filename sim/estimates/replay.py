@@ -2,8 +2,8 @@
 
 With `coarsen` = N the estimator sees counts // N, and everything that is reported is in recorded counts and true
 seconds, whatever N is. The floor puts coarse counts (N - 1) / 2 recorded counts too low on average; the offset is
-constant, so it adds no velocity. The axis is described in `replay_axis`, and what is derived and checked before a run in
-`replay_plan`.
+constant, so it adds no velocity. `replay_axis` describes the axis; `replay_plan` has what is derived and checked before
+a run.
 
 A capture of edges has real stamps: where the counts go through pins, its own edges do (`captured`). An estimate is
 judged after the first second; of a capture, which may be shorter, at most its first quarter is left out.
