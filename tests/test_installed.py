@@ -28,7 +28,7 @@ SHORT = "--set", "protocol.settle_s=0.5", "--set", "protocol.measure_s=0.2"
 HIT = "hardwall", "hit", "seed-2011", "--estimator", "fdm", *SHORT, "--json"
 NO_HOME = "there is no home folder: what this run makes is not kept; HARDWALL_BUILD names a folder"
 NEEDED = dict.fromkeys(COMMANDS, ("sim",)) | {
-    **dict.fromkeys(("arm", "capture", "connect", "disarm", "home", "set", "watch"), ("host",)),
+    **dict.fromkeys(("arm", "capture", "config", "connect", "disarm", "home", "set", "share", "watch"), ("host",)),
     "panel": ("host", "panel"),
     "bench": ("sim", "testing"),
 }

@@ -17,7 +17,8 @@ def twice(tmp_path_factory) -> list:
     """Return the folders of two releases with one scene and without pages."""
     folders = [tmp_path_factory.mktemp(name) for name in ("first", "second")]
     for folder in folders:
-        release.made(folder, [SCENE], with_pages=False)
+        # Place and route is not among the tests' tools.
+        release.made(folder, [SCENE], with_pages=False, extras=("host", "sim", "testing"))
     return folders
 
 

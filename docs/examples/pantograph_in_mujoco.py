@@ -37,10 +37,11 @@ def press(force_hz: int) -> np.ndarray:
     return 1e6 * depth
 
 
+plt.figure(figsize=(7.0, 4.0))
 for force_hz in (10_000, 1_000):
     depth = press(force_hz)
     print(f"force at {force_hz} Hz: the last 0.1 s swing by {np.ptp(depth[-1000:]):.1f} um")
     plt.plot(np.arange(5000) / 10, depth, label=f"force at {force_hz / 1000:g} kHz")
-plt.gca().set(xlabel="time, ms", ylabel="depth of the tip, µm; the wall begins at 0", ylim=(-200, 300))
+plt.gca().set(xlabel="time, ms", ylabel="depth of the tip, µm; the wall begins at 0", ylim=(-250, 250))
 plt.legend()
-plt.savefig("pantograph.png")
+plt.savefig("pantograph.png", dpi=150)

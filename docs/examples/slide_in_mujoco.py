@@ -30,10 +30,11 @@ def press(force_hz: int) -> np.ndarray:
     return 1e6 * position
 
 
+plt.figure(figsize=(7.0, 4.0))
 for force_hz in (10_000, 1_000):
     position = press(force_hz)
     print(f"force at {force_hz} Hz: the last 0.1 s swing by {np.ptp(position[-1000:]):.1f} um")
     plt.plot(np.arange(5000) / 10, position, label=f"force at {force_hz / 1000:g} kHz")
-plt.gca().set(xlabel="time, ms", ylabel="position, µm; the wall begins at 0", ylim=(-200, 300))
+plt.gca().set(xlabel="time, ms", ylabel="position, µm; the wall begins at 0", ylim=(-250, 250))
 plt.legend()
-plt.savefig("slide.png")
+plt.savefig("slide.png", dpi=150)

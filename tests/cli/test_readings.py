@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from hardwall.model.runtime.extras import absent
 from stimuli.forms import COUNTS, SIZE_RAD, edges, session, sigrok_csv
 from support.command_line import call
 
@@ -103,4 +104,4 @@ def test_without_the_extra_a_file_that_needs_it_names_it(monkeypatch, capsys, fo
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
     code, out, err = call(monkeypatch, capsys, "replay", "log.parquet", "--column", "x")
     assert (code, out) == (1, "")
-    assert err == "hardwall: error: pyarrow is not installed: it comes with pip install 'hardwall[data]'\n"
+    assert err == f"hardwall: error: {absent('pyarrow', 'data')}\n"

@@ -26,13 +26,14 @@ EXTRAS = "host", "panel", "sim", "synth", "testing"
 SUMS, LICENCES = "SHA256SUMS", "LICENCES.txt"
 
 
-def made(folder: Path, scenes: Iterable[str], with_pages: bool) -> list[Path]:
+def made(folder: Path, scenes: Iterable[str], with_pages: bool, extras: Iterable[str] = EXTRAS) -> list[Path]:
     """Make a release in an empty folder; return its files.
 
     Args:
         folder: the folder.
         scenes: the names of the scenes whose Verilog it has.
         with_pages: whether it has the pages.
+        extras: the extras whose packages' licences it lists; they must be installed.
     """
     with tempfile.TemporaryDirectory() as name:
         work = Path(name)
@@ -48,7 +49,7 @@ def made(folder: Path, scenes: Iterable[str], with_pages: bool) -> list[Path]:
             _run(*sphinx, "docs", work / f"{stem}-pages")
             (work / f"{stem}-pages" / ".buildinfo").unlink(missing_ok=True)
             _pack(work / f"{stem}-pages", folder)
-    (folder / LICENCES).write_text(licences(), encoding="utf-8")
+    (folder / LICENCES).write_text(licences(extras), encoding="utf-8")
     files = sorted(folder.iterdir())
     sums = "".join(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in files)
     (folder / SUMS).write_text(sums, encoding="utf-8")
@@ -70,13 +71,13 @@ def _pack(tree: Path, folder: Path) -> None:
     normalise(archive)
 
 
-def licences() -> str:
-    """Return the packages that the extras of a user install, each with its version and what it says of its licence."""
+def licences(extras: Iterable[str]) -> str:
+    """Return the packages that some extras install, each with its version and what it says of its licence."""
     lines = [
-        f"hardwall {importlib.metadata.version('hardwall')}: MIT; what its extras ({', '.join(EXTRAS)}) install:",
+        f"hardwall {importlib.metadata.version('hardwall')}: MIT; what its extras ({', '.join(extras)}) install:",
         "",
     ]
-    for name in environments.needed(*EXTRAS):
+    for name in environments.needed(*extras):
         metadata = importlib.metadata.metadata(name)
         classified = [
             each.rpartition(" :: ")[2] for each in metadata.get_all("Classifier") or [] if "License ::" in each
