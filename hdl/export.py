@@ -14,7 +14,7 @@ from amaranth.hdl import Fragment, Module, Signal, Value, _ir, _nir
 from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 
-from hardwall.model import register_texts
+from hardwall.model import register_header, register_texts
 from hardwall.model.axes.axis import AxesSpec
 from hardwall.model.axis.registers import RegisterMap
 from hardwall.model.runtime.build_folder import home_for_tools
@@ -127,7 +127,7 @@ def _registers(registers: RegisterMap) -> dict[str, str]:
     """Return the files of a register map, by name."""
     return {
         "registers.md": register_texts.markdown(registers),
-        "registers.h": register_texts.c_header(registers),
+        "registers.h": register_header.header(registers),
         "registers.json": register_texts.as_json(registers),
     }
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from ...model import register_texts
+from ...model import register_header, register_texts
 from ...model.axes.axis import AxesSpec
 from ...model.runtime.result import text_of
 from ...model.spec import AxisSpec
@@ -108,7 +108,7 @@ def _fill(order: Order, design: Design, runs: list[Placed], report: dict, work: 
     registers = design.top.registers
     texts = {
         "registers.md": register_texts.markdown(registers),
-        "registers.h": register_texts.c_header(registers),
+        "registers.h": register_header.header(registers),
         "registers.json": register_texts.as_json(registers),
         **_pages(board, order.spec),
         "report.json": json.dumps(report, indent=2) + "\n",

@@ -12,7 +12,7 @@ from hardwall.hdl.axis.board import Board
 from hardwall.hdl.export import SYNCHRONISER, to_verilog, write
 from hardwall.hdl.link.axi_link import AxiLink
 from hardwall.hdl.ports import port_table
-from hardwall.model import register_texts
+from hardwall.model import register_header, register_texts
 from hardwall.model.axis.registers import RegisterMap
 from hardwall.sim.rtl.verilator import LINT_OPTIONS, environment
 from stimuli.lengths import LONG
@@ -175,7 +175,7 @@ def test_written_tables_are_all_there(written):
 def test_written_registers_are_those_of_the_board(written):
     registers = Board(spec("mhz")).registers
     assert (written / "registers.md").read_text() == register_texts.markdown(registers)
-    assert (written / "registers.h").read_text() == register_texts.c_header(registers)
+    assert (written / "registers.h").read_text() == register_header.header(registers)
     assert (written / "registers.json").read_text() == register_texts.as_json(registers)
 
 

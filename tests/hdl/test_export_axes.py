@@ -9,7 +9,7 @@ from hardwall.hdl.axes.axis import Axes
 from hardwall.hdl.axes.board import AxesBoard
 from hardwall.hdl.export import to_verilog, write
 from hardwall.hdl.ports import port_table
-from hardwall.model import register_texts
+from hardwall.model import register_header, register_texts
 from hardwall.model.axes.axis import AxesSpec
 from hardwall.model.axes.registers import AxesMap
 from hardwall.sim.rtl.verilator import LINT_OPTIONS, environment
@@ -80,5 +80,5 @@ def test_written_tables_have_the_ports_the_words_and_the_registers(written):
         assert f"\n| {number} | `{word.name}` | {word.format} | {word.reset} | {word.doc} |\n" in text
     registers = AxesMap(spec)
     assert (written / "registers.md").read_text() == register_texts.markdown(registers)
-    assert (written / "registers.h").read_text() == register_texts.c_header(registers)
+    assert (written / "registers.h").read_text() == register_header.header(registers)
     assert (written / "registers.json").read_text() == register_texts.as_json(registers)
