@@ -53,8 +53,8 @@ def _fields(registers: RegisterMap) -> Iterator[str]:
         if register.name in ("state", "flags", "latched", "first", "capture_state"):
             yield f"{register.name.upper()}_MASK 0x{register.format.max:X}"
     for bit, cause in enumerate(CAUSES):
-        register, shift = divmod(COUNT_BITS * bit, VALUE_BITS)
-        field = f"{COUNTS.upper()}{register}_{cause.name.upper()}"
+        value, shift = divmod(COUNT_BITS * bit, VALUE_BITS)
+        field = f"{COUNTS.upper()}{value}_{cause.name.upper()}"
         yield f"{field}_SHIFT {shift}"
         yield f"{field}_MASK 0x{(1 << COUNT_BITS) - 1 << shift:X}"
     if registers.capture:
