@@ -5,10 +5,9 @@ A bound that is not given comes from the counts:
 - travel: the span of the counts, rounded up to a power of two, at most that of a 32-bit count;
 - speed: the largest change in a sample and one count more, rounded up to a power of two;
 - acceleration: the largest second difference over T samples, |c(k + T) - 2 c(k) + c(k - T)| / T^2, with the shortest
-  T of 1, 2, 4, ... in which it reaches `ENOUGH` counts; if none does, the largest that the counts allow.
-
-The counts are rounded, which is worth at most two counts of such a difference. So the bound is at most
-ENOUGH / (ENOUGH - 2) of the largest acceleration, and no less than (ENOUGH - 2) / ENOUGH of the largest mean over T.
+  T of 1, 2, 4, ... in which it reaches `ENOUGH` counts. The counts are rounded, which is worth at most two counts of
+  such a difference: so the bound is at most ENOUGH / (ENOUGH - 2) of the largest acceleration, and no less than
+  (ENOUGH - 2) / ENOUGH of the largest mean over T. If none reaches it, the largest that is certain: two counts less.
 
 Who designs hardware gives the bounds: an axis does not know its future.
 """
@@ -19,7 +18,7 @@ from typing import Any, Self
 import numpy as np
 
 from .arithmetic.fixed import bits_for
-from .checks import NUMBERS, FieldError, check_number, check_range
+from .checks import NUMBERS, FieldError, check_number, check_range, integers
 from .requirements import EDGE_ERROR_COUNTS
 
 ENOUGH = 16
@@ -68,15 +67,18 @@ class Motion:
         """Return the bounds of a record, and those of them that are not given and come from the counts, by name.
 
         Args:
-            counts: int64, shape (lanes, samples) with two samples or more.
+            counts: integers, shape (..., samples) with two samples or more; one set of bounds for all lanes.
             sample_hz: sample rate, Hz.
             count: size of one count.
             given: bounds by name; None is as if it were not given.
 
         Raises:
-            TypeError: if a bound is not a number.
-            ValueError: if a name is no bound, or a bound is not within `checks.NUMBERS`.
+            TypeError: if a bound is not a number, or the counts are not integers.
+            ValueError: if a name is no bound, a bound is not within `checks.NUMBERS`, or there are too few samples.
         """
+        counts = integers("counts", counts)
+        if counts.ndim == 0 or counts.shape[-1] < 2 or not counts.size:
+            raise ValueError(f"counts must have two samples or more, not the shape {counts.shape}")
         check_number("count", count)
         check_range("count", count, *NUMBERS)
         given = {name: value for name, value in given.items() if value is not None}
@@ -110,8 +112,8 @@ def acceleration_of(counts: np.ndarray) -> float:
     while 2 * apart < counts.shape[-1]:
         middle = counts[..., apart:-apart]
         most = int(np.abs(counts[..., 2 * apart :] - 2 * middle + counts[..., : -2 * apart]).max())
-        largest = most / apart**2
         if most >= ENOUGH:
-            break
+            return most / apart**2
+        largest = max(largest, (most - 2) / apart**2)
         apart *= 2
     return largest

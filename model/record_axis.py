@@ -4,10 +4,12 @@ from dataclasses import replace
 from typing import Any
 
 from .arithmetic.fixed import bits_for
+from .checks import FieldError, shown
 from .encoder import quadrature
 from .encoder.quadrature_speed import max_edge_rate
+from .estimators import registry
 from .estimators.estimate import EstimatorGains
-from .motion import Motion
+from .motion import TRAVEL_MAX, Motion
 from .record_time import SECOND, RecordTime
 from .spec import AxisSpec
 
@@ -17,16 +19,19 @@ DECODER_CLOCKS = quadrature.latency(GLITCH_CLOCKS)
 """The latency of the decoder: an edge this many clocks before a strobe is the last that is counted at it."""
 CLOCKS = 1 << 16
 """The clocks of a sample with which a design is tried first."""
+STEP_MAX = 2.0**24
+"""The largest bound on the speed, counts a sample."""
 
 
-def idle_axis(fastest: float, clocks: float = 1, **requirements: Any) -> AxisSpec:
-    """Return the specification of an axis with `SECOND` samples a second, whose wall and output stage are idle.
+def idle_axis(fastest: float, clocks: float = 1, second: int = SECOND, **requirements: Any) -> AxisSpec:
+    """Return the specification of an axis whose wall and output stage are idle.
 
     A sample has clocks enough for the force path and for the fastest change through the decoder, a power of two.
 
     Args:
         fastest: the largest change of the count in a sample.
         clocks: the fewest clocks of a sample.
+        second: samples a second.
         requirements: count, travel, bounds, estimator and gains, by their names in `AxisSpec`.
 
     Raises:
@@ -35,20 +40,20 @@ def idle_axis(fastest: float, clocks: float = 1, **requirements: Any) -> AxisSpe
     """
     count = requirements["count_m"]
     spec = AxisSpec(
-        clock_hz=SECOND * CLOCKS,
-        sample_hz=SECOND,
-        actuation_hz=SECOND,
+        clock_hz=second * CLOCKS,
+        sample_hz=second,
+        actuation_hz=second,
         force_max_n=1.0,
         force_resolution_n=1.0,
         stiffness_max_n_per_m=1.0 / count,
-        damping_max_n_s_per_m=1.0 / count / SECOND,
+        damping_max_n_s_per_m=1.0 / count / second,
         glitch_clocks=GLITCH_CLOCKS,
         **requirements,
     )
     # The edges of an interval begin before its strobe, and must not overlap the force path of the previous interval.
     path = spec.design.latency_to_drive + DECODER_CLOCKS
     needed = max(path, fastest / max_edge_rate(1.0, GLITCH_CLOCKS), clocks)
-    return replace(spec, clock_hz=2 ** bits_for(needed) * SECOND)
+    return replace(spec, clock_hz=2 ** bits_for(needed) * second)
 
 
 def axis_of(
@@ -67,10 +72,13 @@ def axis_of(
         TypeError: if the gains are of another estimator.
         ValueError: if the hardware has no words for these bounds.
     """
+    fastest = motion.speed_max / (motion.count * time.sample_hz)
+    _check(motion, time, estimator, gains)
     try:
         return idle_axis(
-            motion.speed_max / (motion.count * time.sample_hz) + 1,
+            fastest + 1,
             clocks,
+            time.second,
             count_m=float(motion.count),
             travel_m=float(motion.travel),
             speed_max_m_per_s=time.to_axis(motion.speed_max, 1),
@@ -81,5 +89,20 @@ def axis_of(
             gains=None if gains is None else time.gains(gains),
         )
     except ValueError as error:
-        why = f"with {SECOND} samples a second: {error}"
+        why = f"as if {time.second} samples were a second: {error}"
         raise ValueError(f"{estimator} has no words for this motion ({why})") from None
+
+
+def _check(motion: Motion, time: RecordTime, estimator: str, gains: EstimatorGains | None) -> None:
+    """Raise unless bounds are within what hardware has, and gains are of the estimator."""
+    kind = registry.design_of(estimator).gains_class
+    if gains is not None and not isinstance(gains, kind):
+        raise TypeError(f"gains must be {kind.__module__.rpartition('.')[2]}.Gains or None, not {shown(gains)}")
+    for name, counts, unit, (least, most) in (
+        ("travel", motion.travel / motion.count, motion.count, (1.0, TRAVEL_MAX)),
+        ("speed_max", motion.speed_max / (motion.count * time.sample_hz), motion.count * time.sample_hz, (0, STEP_MAX)),
+    ):
+        if not least <= counts <= most:
+            where = f"with counts of {motion.count:g} at {time.sample_hz:g} Hz"
+            value = getattr(motion, name)
+            raise FieldError(name, f"must be {least * unit:g} to {most * unit:g} {where}, not {value:g}")

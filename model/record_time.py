@@ -1,21 +1,22 @@
-"""The time of a record: an axis for counts at any sample rate, whole or not.
+"""The time of a record: an axis for samples at any rate, whole or not.
 
-In the `AxisSpec` of a record a second is `SECOND` *sample periods* (a time in which no stamp of an edge wraps), so that
-the same hardware serves any rate. Lengths stay in the unit of the record. A quantity of the unit 1/s^p is, in the
-axis's seconds, (SECOND / sample_hz)**p times what it is in true ones.
+An `AxisSpec` has a whole number of samples a second. The axis of a record has a second of its own, a number of *sample
+periods*, so that the same hardware serves any rate. Lengths stay in the unit of the record. A quantity of the unit
+1/s^p is, in that second, (second / sample_hz)**p times what it is in a true one.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from .checks import FieldError, check_number, check_range
+from .checks import FieldError, check_int, check_number, check_range
 from .estimators.estimate import EstimatorGains
 from .requirements import RATES_HZ
 from .words import Word
 
 SECOND = 1 << 10
-"""The number of sample periods in a second of the axis."""
+"""The usual number of sample periods in the second of a record's axis."""
+SECOND_MAX = 1 << 40
 RATES = 1e-6, float(RATES_HZ[1])
 """The least and the largest sample rate of a record, Hz."""
 OF_UNIT = re.compile(r"/s(?:\^\(?(\d+)(?:/(\d+))?\)?)?$")
@@ -42,25 +43,29 @@ class RecordTime:
 
     Attributes:
         sample_hz: the record's sample rate in true seconds, within `RATES`.
+        second: the sample periods in a second of the axis. The clock stamps of edges wrap after that second or more:
+            edges that are further apart read as standstill, as they do in hardware after a true second.
 
     Raises:
-        TypeError: if the rate is not a number.
-        ValueError: if it is not within `RATES`.
+        TypeError: if the rate is not a number, or `second` is no int.
+        ValueError: if one is out of range.
     """
 
     sample_hz: float
+    second: int = SECOND
 
     def __post_init__(self) -> None:
         check_number("sample_hz", self.sample_hz)
         check_range("sample_hz", self.sample_hz, *RATES)
+        check_int("second", self.second, 1, SECOND_MAX)
 
     def to_axis(self, value: float, power: float) -> float:
         """Return a quantity of unit 1/s^power in the axis's seconds."""
-        return value * (SECOND / self.sample_hz) ** power
+        return value * (self.second / self.sample_hz) ** power
 
     def from_axis(self, value: float, power: float) -> float:
         """Return a quantity of the axis in true seconds."""
-        return value * (self.sample_hz / SECOND) ** power
+        return value * (self.sample_hz / self.second) ** power
 
     def gains(self, gains: EstimatorGains) -> EstimatorGains:
         """Return gains in the axis's seconds."""
@@ -74,22 +79,26 @@ class RecordTime:
             for name, value in vars(gains).items()
         }
 
-    def encode(self, words: Mapping[str, Word], si: Mapping[str, float]) -> tuple[dict[str, int], dict[str, float]]:
-        """Return the words of settings, by name, and the settings in the axis's seconds.
+    def words(self, words: Iterable[Word]) -> dict[str, Word]:
+        """Return an axis's words with their values in true seconds, by name."""
+        return {
+            word.name: replace(word, si_per_unit=self.from_axis(word.si_per_unit, power_of_unit(word.unit)))
+            for word in words
+        }
+
+    def settings(self, words: Mapping[str, Word], si: Mapping[str, float]) -> dict[str, float]:
+        """Return settings in the axis's seconds.
 
         Args:
-            words: the words that may be set, by name.
+            words: the words that may be set, by name, in true seconds.
             si: settings by the name of their word, in true seconds.
 
         Raises:
             TypeError: if a setting is not a number.
             ValueError: if a name is no word, or a setting does not fit; the message says what is accepted.
         """
-        encoded, scaled = {}, {}
         for name, value in si.items():
             if name not in words:
                 raise FieldError(name, f"is no setting; accepted are {', '.join(words) or 'none'}")
-            word, power = words[name], power_of_unit(words[name].unit)
-            true = replace(word, si_per_unit=self.from_axis(word.si_per_unit, power))
-            encoded[name], scaled[name] = true.from_si(value), self.to_axis(value, power)
-        return encoded, scaled
+            words[name].from_si(value)
+        return {name: self.to_axis(value, power_of_unit(words[name].unit)) for name, value in si.items()}

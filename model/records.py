@@ -8,20 +8,24 @@ from numpy.typing import ArrayLike
 
 from . import checks
 from .axis.axis import Axis
+from .counter import check_bits, cure, unwrapped
+from .edge_times import clocks_of, samples_of, since_first
 from .encoder.level import level
 from .motion import Motion
 from .record_axis import DECODER_CLOCKS, axis_of
-from .record_time import RecordTime
+from .record_time import SECOND, RecordTime
 from .stamped import run
-from .velocity_estimator import VelocityEstimator, chosen
+from .velocity_estimator import VelocityEstimator, check_of_counts, is_floating, output_of
 
 CLOCK_HZ, CLOCKS = 100e6, 1 << 16
 """The clock that stamps edges is at least so fast, but for what it has in a sample beyond so many clocks."""
-BOUNDS = "acceleration_max", "speed_max", "travel", "jerk_max", "edge_error"
+CLOCK_RANGE = 1e-6, 2.0**48
+BOUNDS = "speed_max", "travel", "jerk_max", "edge_error"
+"""The bounds of a motion that are settings."""
 
 
 class RecordWarning(UserWarning):
-    """What a velocity rests on beside its arguments: bounds from the record, or words that saturated."""
+    """Something that a velocity depends on beyond the arguments: bounds from the record, or a flag that was raised."""
 
 
 def velocity(
@@ -39,10 +43,12 @@ def velocity(
 
         velocity(counts, 10e3, count=1e-6)               # m/s, of counts of 1 um at 10 kHz
 
-    Causal: a velocity uses the counts up to its sample. `VelocityEstimator` takes a record in pieces.
+    Causal, if the bounds are given: a velocity then depends on the counts up to its sample. An estimator starts at 0
+    and takes some time to settle. `VelocityEstimator` takes a record in pieces.
 
     Args:
-        counts: integers, shape (..., samples), with two samples or more along `axis`; other axes are independent.
+        counts: integers, shape (..., samples), with two samples or more along `axis`; other axes are lanes of one
+            motion, which have the same bounds.
         sample_hz: sample rate, Hz, `record_time.RATES`; it need not be whole.
         estimator: name of an estimator that needs only counts: see `estimators.registry`.
         count: size of a count; the result is in its unit per second. 1 gives counts/s.
@@ -50,30 +56,36 @@ def velocity(
         output: the estimator's output; None for its first.
         backend: `fixed` for the hardware's words, `float` for the same algorithm in float64 with unrounded gains.
         axis: the axis of time.
-        settings: further bounds (`speed_max`, unit/s; `travel`, unit; see `motion.Motion`), the estimator's `gains`,
-            and run-time words by name, in seconds and the unit of `count`. A word may be an array: it is broadcast
-            against the other axes, a value a lane.
+        settings: further bounds (`speed_max`, unit/s; `travel`, unit; see `motion.Motion`); `count_bits`, the width of
+            a counter that wraps; the estimator's `gains`; and run-time words by name, in seconds and the unit of
+            `count`. A word may be an array: it is broadcast against the other axes, a value a lane.
 
     Returns:
         float64, the shape of the counts; where words are arrays, the shape to which both broadcast.
 
     Warns:
         RecordWarning: with the bounds that come from the record, for they make a velocity depend on later counts; and
-            if a word saturated.
+            if a flag was raised.
 
     Raises:
         TypeError: if an argument is of the wrong type.
         ValueError: if a name is unknown, a value is out of range, or there are fewer than two samples.
     """
-    array = checks.integers("counts", counts)
-    if array.ndim == 0 or not -array.ndim <= axis < array.ndim or array.shape[axis] < 2 or not array.size:
-        raise ValueError(f"counts must have two samples or more along axis {axis!r}, not the shape {array.shape}")
-    chosen(estimator, output, backend)
-    moved = np.moveaxis(array, axis, -1)
-    motion = _motion(moved.reshape(-1, moved.shape[-1]), sample_hz, count, acceleration_max, settings)
+    array = np.moveaxis(checks.integers("counts", counts), axis, -1)
+    if array.shape[-1] < 2:
+        raise ValueError(f"counts must have two samples or more along axis {axis}, not {array.shape[-1]}")
+    if not array.size:
+        return np.zeros(np.shape(counts))
+    is_floating(backend)
+    check_of_counts(estimator)
+    output_of(estimator, output)
+    bits = settings.pop("count_bits", None)
+    check_bits(bits)
+    whole = unwrapped(array, bits)
+    motion, found = _motion(whole, sample_hz, count, acceleration_max, settings)
     taken = VelocityEstimator(sample_hz, estimator, motion, output, backend, **settings)
-    made = taken(array, axis)
-    _tell_flags(taken.flags)
+    made = taken(np.moveaxis(whole, -1, axis), axis)
+    _tell(found, taken.flags, cure(int(np.abs(np.diff(whole)).max())))
     return made
 
 
@@ -90,14 +102,18 @@ def velocity_of_edges(
 ) -> np.ndarray:
     """Return the velocity at a rate of its own, from an encoder's edges and their times, as the hardware estimates it.
 
+    Edges that are more than a second (or 1024 samples, if that is longer) apart read as standstill, as in hardware.
+
     Args:
-        times_s: s, shape (edges,), increasing: the start of the record, and the time of every edge.
-        counts: integers of the same shape: the count at the start, and behind every edge. An edge changes it by 1.
-        sample_hz: rate of the velocities, Hz.
+        times_s: s, shape (edges,), increasing: the start of the record, and the time of every edge. Integers and
+            `datetime64` keep the resolution that float64 does not have far from 0; integers are seconds, too.
+        counts: integers of the same shape: the count at the start, and after every edge. An edge changes it by 1.
+        sample_hz: rate of the velocities, Hz; at most `edge_times.SAMPLES_MAX` samples.
         estimator: name of an estimator, by stamps of edges or not: see `estimators.registry`.
         count, acceleration_max, output, backend: as of `velocity`.
-        settings: as of `velocity`, and `clock_hz`, the least rate of the clock that stamps edges, Hz. Without it,
-            the clock tells the closest edges apart, and is 100 MHz, or 65 536 clocks a sample if that is less.
+        settings: as of `velocity`, but words are numbers. `clock_hz`: the least rate of the clock that stamps edges,
+            Hz; None for one that tells the closest edges apart and is 100 MHz, or has 65 536 clocks a sample if that is
+            slower.
 
     Returns:
         float64, shape (samples,): the velocity at times_s[0] + k / sample_hz, from k = 1 to the last edge. An edge at
@@ -107,90 +123,45 @@ def velocity_of_edges(
         As `velocity`; ValueError also if times do not increase, a count changes by another number than 1, or edges
         come faster than the clock.
     """
-    output, time = chosen(estimator, output, backend), RecordTime(sample_hz)
-    times, array = _edges(times_s, counts)
-    least = max(min(CLOCK_HZ, CLOCKS * sample_hz), 1 / np.diff(times).min())
-    clock_hz, gains = settings.pop("clock_hz", least), settings.pop("gains", None)
+    floating, output = is_floating(backend), output_of(estimator, output)
+    array = checks.integers("counts", counts)
+    since, unsure_s = since_first(times_s, array)
+    second = max(SECOND, 1 << int(np.ceil(np.log2(max(RecordTime(sample_hz).sample_hz, 1)))))
+    time = RecordTime(sample_hz, second)
+    clock_hz, gains = settings.pop("clock_hz", None), settings.pop("gains", None)
+    if clock_hz is None:
+        clock_hz = max(min(CLOCK_HZ, CLOCKS * sample_hz), 1 / np.diff(since).min())
     checks.check_number("clock_hz", clock_hz)
-    sampled = _sampled(times, array, sample_hz)
-    motion = _motion(sampled[None], sample_hz, count, acceleration_max, settings)
+    checks.check_range("clock_hz", clock_hz, *CLOCK_RANGE)
+    sampled = samples_of(since, array, sample_hz, unsure_s)
+    motion, found = _motion(sampled, sample_hz, count, acceleration_max, settings)
     spec = axis_of(motion, time, estimator, gains, clock_hz / sample_hz)
     design, timing = spec.design.estimator, spec.design.timing
-    words = {word.name: word for word in design.words if word.name != design.output_word()}
-    _, scaled = time.encode(words, settings)
-    clocks = _clocks(times, sample_hz * spec.clocks_per_sample)
+    words = time.words(word for word in design.words if word.name != design.output_word())
+    axis = Axis(spec, floating, **time.settings(words, settings), **design.choose(output))
+    clocks = clocks_of(since, sample_hz * spec.clocks_per_sample, unsure_s)
     # The count at a strobe is that of DECODER_CLOCKS before it; the record starts at the strobe of sample 0.
     first = timing.strobe - DECODER_CLOCKS
-    record = run(
-        Axis(spec, backend == "float", **scaled, **design.choose(output)),
-        first + clocks[1:],
-        level(array[1:] - array[0]),
-        len(sampled),
-        int(level(0)),
-    )
-    _tell_flags(spec.design.flag_names(int(record.flags[-1])))
-    lsb = 1.0 if backend == "float" else design.velocity.lsb
+    record = run(axis, first + clocks[1:], level(array[1:] - array[0]), len(sampled), int(level(0)))
+    _tell(found, spec.design.flag_names(int(record.flags[-1])))
+    lsb = 1.0 if floating else design.velocity.lsb
     return record.velocity[1:] * (lsb * count * sample_hz)
-
-
-def _edges(times_s: ArrayLike, counts: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-    """Return the times and counts of edges as float64 and int64."""
-    array, times = checks.integers("counts", counts), np.asarray(times_s)
-    if times.dtype.kind not in "fiu":
-        raise TypeError(f"times_s must be numbers, not {times.dtype}")
-    times = times.astype(np.float64)
-    if times.ndim != 1 or times.shape != array.shape or len(times) < 2:
-        raise ValueError(
-            f"times_s and counts must have one shape (edges,) of 2 or more, not {times.shape} and {array.shape}"
-        )
-    if (wrong := np.flatnonzero(~np.isfinite(times))).size:
-        raise ValueError(f"times_s must be finite, not {times[wrong[0]]} at element {wrong[0]}")
-    if (wrong := np.flatnonzero(np.diff(times) <= 0)).size:
-        raise ValueError(
-            f"times_s must increase, not from {times[wrong[0]]:g} to {times[wrong[0] + 1]:g} at element {wrong[0] + 1}"
-        )
-    steps = np.diff(array)
-    if (wrong := np.flatnonzero(np.abs(steps) != 1)).size:
-        raise ValueError(f"counts must change by 1 at an edge, not by {steps[wrong[0]]} at element {wrong[0] + 1}")
-    return times, array
-
-
-def _sampled(times: np.ndarray, counts: np.ndarray, sample_hz: float) -> np.ndarray:
-    """Return the counts at the samples, from the start to the last edge."""
-    lasts = times[-1] - times[0]
-    samples = int(np.floor(lasts * sample_hz))
-    if samples < 1:
-        raise ValueError(f"times_s must last a sample of {1 / sample_hz:g} s or more, not {lasts:g} s")
-    at = times[0] + np.arange(samples + 1) / sample_hz
-    return counts[np.searchsorted(times, at, side="right") - 1]
-
-
-def _clocks(times: np.ndarray, clock_hz: float) -> np.ndarray:
-    """Return the clocks of edges, int64: their times since the first, rounded up."""
-    clocks = np.ceil((times - times[0]) * clock_hz)
-    if (close := np.flatnonzero(np.diff(clocks) < 1)).size:
-        raise ValueError(
-            f"times_s must be a clock of {1 / clock_hz:g} s apart or more, not "
-            f"{times[close[0] + 1] - times[close[0]]:g} s at element {close[0] + 1}; clock_hz gives a faster clock"
-        )
-    return clocks.astype(np.int64)
 
 
 def _motion(
     counts: np.ndarray, sample_hz: float, count: float, acceleration_max: float | None, settings: dict[str, Any]
-) -> Motion:
-    """Return the bounds for a record, taken out of the settings or from the counts; warn of the latter."""
+) -> tuple[Motion, dict[str, float]]:
+    """Return the bounds for a record, taken out of the settings or from the counts, and the latter by name."""
     RecordTime(sample_hz)
-    given = {name: settings.pop(name, None) for name in BOUNDS[1:]}
-    motion, found = Motion.of(counts, sample_hz, count, acceleration_max=acceleration_max, **given)
+    given = {name: settings.pop(name, None) for name in BOUNDS}
+    return Motion.of(counts, sample_hz, count, acceleration_max=acceleration_max, **given)
+
+
+def _tell(found: dict[str, float], flags: list[str], hint: str = "") -> None:
+    """Warn the caller's caller of bounds that come from the record, and of flags."""
     if found:
         said = ", ".join(f"{name}={value:.6g}" for name, value in found.items())
-        warnings.warn(f"{said}: from the record, because not given", RecordWarning, stacklevel=3)
-    return motion
-
-
-def _tell_flags(flags: list[str]) -> None:
+        warnings.warn(f"{said}: from the record, because not given{hint}", RecordWarning, stacklevel=3)
     if flags:
-        warnings.warn(
-            f"{', '.join(flags)}: larger bounds (speed_max, acceleration_max) may help", RecordWarning, stacklevel=3
-        )
+        cures = "; a larger speed_max may help" if "velocity_saturated" in flags else ""
+        warnings.warn(f"raised flags: {', '.join(flags)}{cures}{hint}", RecordWarning, stacklevel=3)

@@ -11,10 +11,12 @@ What passes more edges than a sample has clocks is beyond any decoder: both pins
 """
 
 import math
+from copy import deepcopy
 from functools import cache
 from typing import Any
 
 import numba
+import numpy as np
 from numba.experimental import jitclass
 
 from .axis.axis import Axis
@@ -25,6 +27,7 @@ from .encoder.quadrature import Inputs, advance
 from .runtime.compiled import compiled, inlined
 from .spec import AxisSpec
 from .stamped import State, controller, sample_quietly
+from .velocity_estimator import is_floating
 
 REACH = 2.0**52
 """The largest position in counts, either way: of a larger one, the cell is not known."""
@@ -86,6 +89,8 @@ def _take(cell, position):
     cell.state = sample(cell.controller, cell.state, cell.timing, cell.count_m, places, cell.samples)
     cell.place = position
     cell.samples += 1
+    cell.velocity, cell.flags = cell.state.velocity, cell.state.flags
+    cell.count = cell.state.decoder.count
     return float(cell.state.drive)
 
 
@@ -99,12 +104,16 @@ def _cell(controller: Any, state: Any, timing: Any) -> type:
         ("count_m", numba.float64),
         ("place", numba.float64),
         ("samples", numba.int64),
+        ("velocity", numba.float64),
+        ("flags", numba.int64),
+        ("count", numba.int64),
     )
 
     class Cell:
-        def __init__(self, controller, state, timing, count_m, place):
+        def __init__(self, controller, state, timing, count_m, place, samples):
             self.controller, self.state, self.timing = controller, state, timing
-            self.count_m, self.place, self.samples = count_m, place, 0
+            self.count_m, self.place, self.samples = count_m, place, samples
+            self.velocity, self.flags, self.count = state.velocity, state.flags, state.decoder.count
 
     return jitclass(members)(Cell)
 
@@ -116,12 +125,16 @@ class Sampler:
         while True:
             force_n = sampler(position_m)       # every 1 / spec.sample_hz seconds
 
-    The first position is that of the axis at reset: it gives the count, and no velocity. The count is the position over
-    the size of a count, rounded down. An edge within the decoder's latency before a sample counts at the next one.
+    The first position is where the axis is reset: it sets the count, and there is no velocity yet. The count is the
+    position over the size of a count, rounded down: to give a count n, pass (n + 0.5) count_m. An edge within the
+    decoder's latency before a sample counts at the next one. The force is that of the last change of the drive, at
+    `spec.actuation_hz`; in hardware it changes `spec.design.latency_to_drive` clocks after the sample.
+
+    The first call compiles, for some seconds. `copy.deepcopy` and `pickle` keep the state.
 
     Args:
         spec: the axis.
-        floating: true for the same algorithms in float64, with gains unrounded.
+        backend: `fixed` for the hardware's words, `float` for the same algorithms in float64 with unrounded gains.
         si: run-time words in SI units by name, e.g. `wall_stiffness=20e3` (N/m); see `axis.design.Design.words`.
 
     Raises:
@@ -129,15 +142,29 @@ class Sampler:
         ValueError: if a name is unknown or a value is out of range.
     """
 
-    def __init__(self, spec: AxisSpec, floating: bool = False, **si: float):
+    def __init__(self, spec: AxisSpec, backend: str = "fixed", **si: float):
         if not isinstance(spec, AxisSpec):
             raise TypeError(f"spec must be an AxisSpec, not {shown(spec)}")
-        self.spec, self._floating, self._si = spec, floating, dict(si)
-        self._axis = Axis(spec, floating, **si)
+        self.spec, self._floating, self._si = spec, is_floating(backend), dict(si)
+        self._axis = Axis(spec, self._floating, **si)
         self._kept: Any = None
 
+    def __repr__(self) -> str:
+        return f"Sampler({self.spec.estimator!r} at {self.spec.sample_hz} Hz)"
+
+    def __getstate__(self) -> dict[str, Any]:
+        kept = self._kept
+        held = None if kept is None else (self.state, kept.place, kept.samples)
+        return {"spec": self.spec, "floating": self._floating, "si": self._si, "held": held}
+
+    def __setstate__(self, held: dict[str, Any]) -> None:
+        self.spec, self._floating, self._si = held["spec"], held["floating"], dict(held["si"])
+        self._axis, self._kept = Axis(self.spec, self._floating, **self._si), None
+        if held["held"] is not None:
+            self._keep(*held["held"])
+
     def reset(self) -> None:
-        """Begin anew: the next position is the first. Run-time words stay."""
+        """Begin anew: the next position is the first, and flags are down. Run-time words stay."""
         self._kept = None
 
     def set(self, **si: float) -> None:
@@ -153,48 +180,64 @@ class Sampler:
             self._kept.controller = controller(self._axis, 0)[0]
 
     def __call__(self, position_m: float) -> float:
-        """Take a sample at a position, m; return the force on the handle behind the output stage, N.
+        """Take a sample at a position, m; return the force on the handle after the output stage, N.
 
         Raises:
-            ValueError: if the position is not finite, or the first one is beyond the count.
+            TypeError: if the position is not a number.
+            ValueError: if it is not finite, or the first one is beyond the count.
         """
+        if type(position_m) is not float:
+            position_m = _number(position_m)
         if self._kept is None:
             self._start(position_m)
-        drive = _take(self._kept, float(position_m))
+        drive = _take(self._kept, position_m)
         if math.isnan(drive):
             raise ValueError(f"position_m must be finite, and within 2**52 counts, not {shown(position_m)}")
         return drive * self.spec.force_resolution_n
 
     def _start(self, position_m: float) -> None:
-        check_number("position_m", position_m)
-        half = 1 << (self.spec.count_width - 1)
-        reach_m = half * self.spec.count_m
+        reach_m = (1 << (self.spec.count_width - 1)) * self.spec.count_m
         if not -reach_m <= position_m < reach_m:
             raise ValueError(f"position_m must begin within -{reach_m:g} to {reach_m:g} m, not {shown(position_m)}")
-        count = cell_of(float(position_m), self.spec.count_m)
-        words, state = controller(self._axis, int(level(count)))
-        state = state._replace(decoder=state.decoder._replace(count=count))
-        timing = self._axis.design.timing
+        count = cell_of(position_m, self.spec.count_m)
+        state = controller(self._axis, int(level(count)))[1]
+        self._keep(state._replace(decoder=state.decoder._replace(count=count)), position_m, 0)
+
+    def _keep(self, state: State, place: float, samples: int) -> None:
+        words, timing = controller(self._axis, 0)[0], self._axis.design.timing
         kind = _cell(*map(numba.typeof, (words, state, timing)))
-        self._kept = kind(words, state, timing, float(self.spec.count_m), float(position_m))
+        # What the state has in arrays is its own.
+        self._kept = kind(words, deepcopy(state), timing, float(self.spec.count_m), place, samples)
 
     @property
     def state(self) -> State | None:
-        """The states of decoder and axis after the last sample; None before the first."""
-        return None if self._kept is None else self._kept.state
+        """The states of decoder and axis after the last sample, as a copy; None before the first."""
+        return None if self._kept is None else deepcopy(self._kept.state)
 
     @property
     def velocity_m_per_s(self) -> float:
         """The velocity of the last sample, m/s; 0 before the first."""
         lsb = 1.0 if self._floating else self._axis.design.estimator.velocity.lsb
-        return 0.0 if self._kept is None else self._kept.state.velocity * lsb * self.spec.velocity_unit_m_per_s
+        return 0.0 if self._kept is None else self._kept.velocity * lsb * self.spec.velocity_unit_m_per_s
 
     @property
     def count(self) -> int:
-        """The count of the last sample; 0 before the first."""
-        return 0 if self._kept is None else self._kept.state.decoder.count
+        """The count of the last sample, counts; 0 before the first."""
+        return 0 if self._kept is None else self._kept.count
 
     @property
     def flags(self) -> list[str]:
-        """The names of the sticky flags that are up."""
-        return [] if self._kept is None else self._axis.design.flag_names(self._kept.state.flags)
+        """The names of the flags that are up: they stay until `reset`."""
+        return [] if self._kept is None else self._axis.design.flag_names(self._kept.flags)
+
+
+def _number(position_m: Any) -> float:
+    """Return a position as a float: of what is a number, or an array of one."""
+    value = position_m
+    if isinstance(value, np.generic | np.ndarray) and value.size == 1:
+        value = value.item()
+    check_number("position_m", value)
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf

@@ -1,12 +1,12 @@
 """A velocity estimator of the hardware for records of counts, whole or in pieces."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import checks
+from .counter import check_bits, cure, unwrapped
 from .encoder.quadrature import seen_count
 from .estimators import registry
 from .estimators.estimate import EstimatorGains, estimate
@@ -29,18 +29,35 @@ def run(params: tuple, state: tuple, counts: np.ndarray, velocity: np.ndarray) -
     return state, flags
 
 
-def chosen(estimator: str, output: str | None, backend: str) -> str:
+def is_floating(backend: str) -> bool:
+    """Return whether a backend computes in float64.
+
+    Raises:
+        ValueError: if there is no such backend.
+    """
+    if backend not in BACKENDS:
+        raise checks.FieldError("backend", f"must be one of {', '.join(BACKENDS)}, not {checks.shown(backend)}")
+    return backend == "float"
+
+
+def output_of(estimator: str, output: str | None) -> str:
     """Return the name of an estimator's output, its first for None.
 
     Raises:
         ValueError: if a name is unknown.
     """
     outputs = registry.design_of(estimator).outputs
-    if backend not in BACKENDS:
-        raise checks.FieldError("backend", f"must be one of {', '.join(BACKENDS)}, not {checks.shown(backend)}")
     if output is not None and output not in outputs:
         raise checks.FieldError("output", f"of {estimator} must be one of {', '.join(outputs)}, not {output!r}")
     return outputs[0] if output is None else output
+
+
+def check_of_counts(estimator: str) -> None:
+    """Raise ValueError if there is no such estimator, or it needs the edges."""
+    if registry.design_of(estimator).uses_stamps():
+        raise checks.FieldError(
+            "estimator", f"must be one that needs only counts, not {estimator!r}: velocity_of_edges takes the edges"
+        )
 
 
 class VelocityEstimator:
@@ -49,7 +66,7 @@ class VelocityEstimator:
         estimator = VelocityEstimator(10e3, "kalman", Motion(count=1e-6, acceleration_max=12, speed_max=2, travel=0.15))
         first, second = estimator(counts[:500]), estimator(counts[500:])
 
-    A copy (`copy.deepcopy`) keeps the state, to go on from it twice.
+    `copy.deepcopy` and `pickle` keep the state, to go on from it twice, or elsewhere.
 
     Args:
         sample_hz: sample rate, Hz; it need not be whole.
@@ -58,11 +75,12 @@ class VelocityEstimator:
         output: the estimator's output; None for its first.
         backend: `fixed` for the hardware's words, `float` for the same algorithm in float64 with unrounded gains.
         gains: the estimator's `Gains` in seconds and the motion's unit; None for its default ones.
-        settings: run-time words by name, in seconds and the motion's unit, as of `set`.
+        count_bits: width of a counter that wraps, bits, 2 to 62: steps are taken modulo its range. None: it does not.
+        settings: run-time words by name, as of `set`.
 
     Attributes:
-        spec: the axis that the estimator is of; in it, a second is `record_time.SECOND` samples.
-        words: the run-time words that may be set, by name.
+        spec: the axis that the estimator is of; its second is that of `record_time`.
+        words: the run-time words that may be set, by name, with their ranges in true seconds.
 
     Raises:
         TypeError: if an argument is of the wrong type.
@@ -78,28 +96,33 @@ class VelocityEstimator:
         output: str | None = None,
         backend: str = "fixed",
         gains: EstimatorGains | None = None,
+        count_bits: int | None = None,
         **settings: ArrayLike,
     ):
-        output = chosen(estimator, output, backend)
-        if registry.design_of(estimator).uses_stamps():
-            raise checks.FieldError(
-                "estimator", f"must be one that needs only counts, not {estimator!r}: velocity_of_edges takes the edges"
-            )
-        self._time, self._floating, self._output = RecordTime(sample_hz), backend == "float", output
+        if not isinstance(motion, Motion):
+            raise TypeError(f"motion must be a Motion, not {checks.shown(motion)}")
+        self._time, self._floating = RecordTime(sample_hz), is_floating(backend)
+        check_of_counts(estimator)
+        self._output = output_of(estimator, output)
+        check_bits(count_bits)
+        self._bits = count_bits
         self.spec = axis_of(motion, self._time, estimator, gains)
         self._design = self.spec.design.estimator
-        self.words = {word.name: word for word in self._design.words if word.name != self._design.output_word()}
+        self.words = self._time.words(word for word in self._design.words if word.name != self._design.output_word())
         lsb = 1.0 if self._floating else self._design.velocity.lsb
         self._unit = lsb * motion.count * sample_hz
         self._settings: dict[str, np.ndarray] = {}
         self.reset()
         self.set(**settings)
 
+    def __repr__(self) -> str:
+        return f"VelocityEstimator({self._time.sample_hz!r}, {self.spec.estimator!r}, ...)"
+
     def reset(self) -> None:
         """Forget every count: the next one is the first."""
         self._states: list[tuple] = []
-        self._last: np.ndarray | None = None
-        self._origin: np.ndarray | None = None
+        self._shape: tuple[int, ...] | None = None
+        self._last = self._origin = np.zeros(0, np.int64)
         self._flags = 0
 
     def set(self, **settings: ArrayLike) -> None:
@@ -113,10 +136,13 @@ class VelocityEstimator:
             TypeError: if a value is not a number.
             ValueError: if a name is no word, or a value does not fit its word; the message says what is accepted.
         """
-        for name, values in settings.items():
-            for value in np.asarray(values).ravel().tolist():
-                self._time.encode(self.words, {name: value})
-        self._settings |= {name: np.asarray(values) for name, values in settings.items()}
+        arrays = {name: np.array(values) for name, values in settings.items()}
+        for name, array in arrays.items():
+            if not array.size:
+                raise checks.FieldError(name, "must have a value at least")
+            for value in array.ravel().tolist():
+                self._time.settings(self.words, {name: value})
+        self._settings |= arrays
 
     @property
     def flags(self) -> list[str]:
@@ -128,7 +154,8 @@ class VelocityEstimator:
 
         Args:
             counts: integers; along `axis` they follow one another, and the other axes are independent lanes. A count
-                may have any origin. From one to the next it changes by less than half of the count's range.
+                may have any origin. From one to the next it changes by less than half of the range that follows from
+                the motion's travel, eight times as long.
             axis: the axis of time.
 
         Returns:
@@ -138,16 +165,14 @@ class VelocityEstimator:
             TypeError: if the counts are not integers.
             ValueError: if the counts have no axis of time, or other lanes than before, or jump.
         """
-        counts = checks.integers("counts", counts)
-        if counts.ndim == 0 or not -counts.ndim <= axis < counts.ndim:
-            raise ValueError(f"counts of {counts.ndim} dimensions must have the axis {axis!r}")
-        counts = np.moveaxis(counts, axis, -1)
+        counts = np.moveaxis(checks.integers("counts", counts), axis, -1)
         shape = self._lanes(counts.shape[:-1])
         lanes = np.broadcast_to(counts, (*shape, counts.shape[-1]))
         made = np.zeros(lanes.shape, np.float64)
         if lanes.size:
-            words = self._in_range(lanes.reshape(-1, lanes.shape[-1]))
-            self._start(len(words))
+            words = self._in_range(lanes.reshape(-1, lanes.shape[-1]), shape)
+            if not self._states:
+                self._states = [self._design.start(self._floating) for _ in words]
             for lane, (row, params) in enumerate(zip(words, self._params(shape), strict=True)):
                 velocity = np.zeros(len(row), np.float64 if self._floating else np.int64)
                 self._states[lane], raised = run(params, self._states[lane], row, velocity)
@@ -156,37 +181,35 @@ class VelocityEstimator:
         return np.moveaxis(made, -1, axis)
 
     def _lanes(self, shape: tuple[int, ...]) -> tuple[int, ...]:
-        """Return the shape of the lanes of counts and settings together."""
+        """Return the shape of the lanes of counts and settings together, which is the same in all pieces."""
         shapes = {name: values.shape for name, values in self._settings.items() if values.shape}
+        said = "".join(f", and {name} has the shape {each}" for name, each in shapes.items())
         try:
-            return np.broadcast_shapes(shape, *shapes.values())
+            both = np.broadcast_shapes(shape, *shapes.values())
         except ValueError:
-            said = ", ".join(f"{name} of shape {each}" for name, each in shapes.items())
-            raise ValueError(f"settings must broadcast against lanes of shape {shape}, not {said}") from None
+            raise ValueError(f"settings must broadcast: counts have lanes of shape {shape}{said}") from None
+        if self._shape not in (None, both):
+            raise ValueError(f"lanes must have the shape {self._shape} as before, not {both}{said}")
+        return both
 
-    def _start(self, lanes: int) -> None:
-        """Give every lane its first state, unless it has one."""
-        if not self._states:
-            self._states = [self._design.start(self._floating) for _ in range(lanes)]
-
-    def _in_range(self, counts: np.ndarray) -> np.ndarray:
+    def _in_range(self, counts: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
         """Return counts of shape (lanes, samples) as words of the count's width, around the first count of a lane."""
-        if self._last is None or self._origin is None:
-            self._last = self._origin = counts[:, 0]
-        if len(counts) != len(self._last):
-            raise ValueError(f"counts must have {len(self._last)} lanes as before, not {len(counts)}")
+        first = self._shape is None
+        origin, last = (counts[:, 0], counts[:, 0]) if first else (self._origin, self._last)
+        whole = unwrapped(np.concatenate([last[:, None], counts], axis=-1), self._bits)
         half = 1 << (self.spec.count_width - 1)
-        steps = np.diff(counts, axis=-1, prepend=self._last[:, None])
+        steps = np.diff(whole, axis=-1)
         if (wrong := np.argwhere((steps >= half) | (steps < -half))).size:
             lane, sample = wrong[0]
+            step = int(steps[lane, sample])
             raise ValueError(
                 f"counts must change by less than {half} from sample to sample, half of the range that follows from "
-                f"the travel, not by {steps[lane, sample]} at sample {sample}{f' of lane {lane}' if lane else ''}"
+                f"the travel, not by {step} at sample {sample}{f' of lane {lane}' if lane else ''}{cure(step)}"
             )
-        self._last = counts[:, -1]
-        return ((counts - self._origin[:, None] + half) & (2 * half - 1)) - half
+        self._shape, self._origin, self._last = shape, origin.copy(), whole[:, -1].copy()
+        return ((whole[:, 1:] - self._origin[:, None] + half) & (2 * half - 1)) - half
 
-    def _params(self, shape: Sequence[int]) -> list[tuple]:
+    def _params(self, shape: tuple[int, ...]) -> list[tuple]:
         """Return the kernel's parameters of every lane."""
         lanes = int(np.prod(shape, dtype=int))
         columns = {name: np.broadcast_to(each, shape).ravel().tolist() for name, each in self._settings.items()}
@@ -195,8 +218,8 @@ class VelocityEstimator:
         return [self._parameters({name: values[lane] for name, values in columns.items()}) for lane in range(lanes)]
 
     def _parameters(self, settings: dict[str, Any]) -> tuple:
-        encoded, scaled = self._time.encode(self.words, settings)
+        scaled = self._time.settings(self.words, settings)
         if self._floating:
             return self._design.float_params(self.spec.design.gains, self._output, scaled)
-        words = {word.name: word.reset for word in self._design.words} | self._design.choose(self._output) | encoded
-        return self._design.params(words)
+        words = {word.name: word.reset for word in self._design.words} | self._design.choose(self._output)
+        return self._design.params(words | {name: self.words[name].from_si(settings[name]) for name in settings})

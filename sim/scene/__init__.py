@@ -4,11 +4,17 @@ from ...model.runtime.extras import need
 
 need("sim")
 
+from pathlib import Path
+
+from ...model.checks import shown
 from ...model.spec import AxisSpec
+from .errors import SceneError
 from .load import load
 
+__all__ = ["SceneError", "spec"]
 
-def spec(scene: str) -> AxisSpec:
+
+def spec(scene: str | Path) -> AxisSpec:
     """Return the specification of the axis of a scene: that of its Verilog, gains included.
 
         spec("mhz")         # as `hardwall verilog mhz` generates it
@@ -17,6 +23,10 @@ def spec(scene: str) -> AxisSpec:
         scene: the name of a scene that comes with the project, or the path of a TOML file.
 
     Raises:
-        SceneError: if the scene is not valid; the message is one line on what is wrong, where, and what is accepted.
+        TypeError: if the scene is neither a name nor a path.
+        SceneError: if the scene is not valid, or has several axes; the message is one line on what is wrong, where, and
+            what is accepted.
     """
-    return load(scene).spec
+    if not isinstance(scene, str | Path):
+        raise TypeError(f"scene must be a name or a path, not {shown(scene)}")
+    return load(str(scene)).spec

@@ -16,6 +16,14 @@ def test_the_acceleration_is_that_of_a_parabola_but_for_the_rounding(offset):
         assert acceleration * (1 - 2 / ENOUGH) <= found <= acceleration * ENOUGH / (ENOUGH - 2)
 
 
+def test_a_jump_of_fewer_counts_is_no_other_motion():
+    """A jump of n counts: n - 2 counts a sample^2 at least, and n at most, whether or not that is enough to be sure."""
+    for counts in range(3, 40):
+        jump = np.zeros(1000, np.int64)
+        jump[500:] = counts
+        assert counts - 2 <= acceleration_of(jump) <= counts
+
+
 def test_the_acceleration_of_several_lanes_is_the_largest():
     k = np.arange(2000)
     lanes = np.stack([np.floor(a / 2 * k**2).astype(np.int64) for a in (0.01, 0.5, 0.1)])
@@ -53,6 +61,11 @@ def test_what_is_no_bound_is_refused():
     counts = np.arange(10)[None]
     with pytest.raises(ValueError, match="sped_max is no bound; bounds are count, acceleration_max, speed_max, travel"):
         Motion.of(counts, 1e3, sped_max=1.0)
+    with pytest.raises(TypeError, match="counts must be integers, not float64"):
+        Motion.of(np.zeros((1, 5)), 1e3)
+    with pytest.raises(ValueError, match=r"counts must have two samples or more, not the shape \(3, 1\)"):
+        Motion.of(np.zeros((3, 1), np.int64), 1e3)
+    assert Motion.of(np.array([3, 2, 1], np.uint32), 1.0)[0].speed_max == 2.0
     with pytest.raises(TypeError, match="count must be a number, not None"):
         Motion.of(counts, 1e3, None)
     for wrong in (0.0, -1.0, float("nan"), 1e31):

@@ -32,24 +32,25 @@ def test_default_gains_are_the_same_in_true_seconds(pair):
 
 def test_words_have_the_same_ranges_and_codes_in_true_seconds(pair):
     true, of_record = pair
-    words = {word.name: word for word in of_record.design.estimator.words}
+    own = {word.name: word for word in of_record.design.estimator.words}
+    words = TIME.words(own.values())
     assert len(words) == len(true.design.estimator.words)
     for word in true.design.estimator.words:
         assert words[word.name].format == word.format
         for code in (word.low, word.reset, word.high):
-            encoded, scaled = TIME.encode(words, {word.name: word.to_si(code)})
-            assert encoded == {word.name: code}
-            assert words[word.name].to_si(code) == pytest.approx(scaled[word.name], rel=1e-9)
+            assert words[word.name].to_si(code) == pytest.approx(word.to_si(code), rel=1e-9)
+            scaled = TIME.settings(words, {word.name: word.to_si(code)})
+            assert own[word.name].from_si(scaled[word.name]) == code
 
 
 def test_a_setting_beyond_its_word_is_refused_in_true_seconds():
     axis = axis_of(MOTION, TIME, "levant")
-    words = {word.name: word for word in axis.design.estimator.words}
+    words = TIME.words(axis.design.estimator.words)
     most = AxisSpec(**PAPER).design.estimator.words[0].si_max
     with pytest.raises(FieldError, match=rf"levant_lambda must be [\d.]+ to {most:g} m\^\(1/2\)/s, not 1000"):
-        TIME.encode(words, {"levant_lambda": 1000.0})
+        TIME.settings(words, {"levant_lambda": 1000.0})
     with pytest.raises(FieldError, match="levant_beta is no setting; accepted are levant_lambda, levant_alpha"):
-        TIME.encode(words, {"levant_beta": 1.0})
+        TIME.settings(words, {"levant_beta": 1.0})
 
 
 @pytest.mark.parametrize(
@@ -73,12 +74,14 @@ def test_rates_that_are_refused(rate):
         RecordTime(rate)
 
 
-def test_a_rate_that_is_no_number_is_refused():
+def test_what_is_no_number_is_refused():
     with pytest.raises(TypeError, match="sample_hz must be a number, not '1'"):
         RecordTime("1")
+    with pytest.raises(ValueError, match="second must be 1 to 1099511627776, not 0"):
+        RecordTime(1.0, 0)
 
 
 def test_there_and_back_is_the_same():
-    assert RecordTime(SECOND).to_axis(3.0, 2) == 3.0
+    assert RecordTime(SECOND).to_axis(3.0, 2) == RecordTime(50.0, 50).to_axis(3.0, 2) == 3.0
     time = RecordTime(0.3)
     assert time.from_axis(time.to_axis(7.0, 1.5), 1.5) == pytest.approx(7.0, rel=1e-14)

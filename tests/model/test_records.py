@@ -5,14 +5,19 @@ import warnings
 import numpy as np
 import pytest
 
-from hardwall.model import Motion, RecordWarning, VelocityEstimator, velocity, velocity_of_edges
+from hardwall.model import Motion, RecordWarning, VelocityEstimator, stamped, velocity, velocity_of_edges
+from hardwall.model.axis.axis import Axis
+from hardwall.model.encoder.level import level
+from hardwall.model.encoder.quadrature import latency
 from hardwall.model.estimators.registry import ESTIMATORS
+from hardwall.model.spec import AxisSpec
 from hardwall.sim.estimates.replay import replay
 from hardwall.testing import rng
 from stimuli.lengths import LONG
 from stimuli.replays import recording, swing
 
 STAMPED = [name for name, design in ESTIMATORS.items() if design.uses_stamps()]
+WIDE = {"acceleration_max": 1e6, "speed_max": 1e5, "travel": 1e4}
 BOUNDS = {"acceleration_max": 50.0, "speed_max": 1.0, "travel": 1.0}
 
 
@@ -24,7 +29,7 @@ def _no_warning():
 
 
 def walk(edges: int = 3000) -> tuple[np.ndarray, np.ndarray]:
-    """Return times (s) and counts of edges at random, every tenth in a grid of milliseconds, with turns."""
+    """Return times (s) and counts of edges at random, with turns."""
     random = rng()
     times = np.cumsum(random.integers(20, 3000, edges)) * 1e-6
     return times, np.cumsum(np.where(random.random(edges) < 0.3, -1, 1))
@@ -66,8 +71,22 @@ def test_bounds_that_are_not_given_are_said():
 
 
 def test_a_word_that_saturated_is_said():
-    with pytest.warns(RecordWarning, match="velocity_saturated: larger bounds"):
+    with pytest.warns(RecordWarning, match="raised flags: velocity_saturated; a larger speed_max may help"):
         velocity(np.arange(100) * 4, 1e3, "fdm", acceleration_max=50.0, speed_max=1e3, travel=1e3)
+
+
+def test_a_counter_that_wraps_is_named_and_unwrapped():
+    counts = np.cumsum(rng().integers(-900, 1000, 5000))
+    made = velocity(counts, 1e3, "kalman", acceleration_max=1e6, speed_max=2e6, travel=1e6)
+    wrapped = counts.astype(np.int16)
+    again = velocity(wrapped, 1e3, "kalman", acceleration_max=1e6, speed_max=2e6, travel=1e6, count_bits=16)
+    assert again.tolist() == made.tolist()
+    with pytest.warns(RecordWarning, match=r"not given; if the counter wraps, give count_bits=16$"):
+        velocity(wrapped, 1e3, "fdm")
+
+
+def test_no_lanes_are_no_velocities():
+    assert velocity(np.zeros((0, 5), np.int64), 1e3).shape == (0, 5)
 
 
 def test_lanes_and_the_axis_of_time():
@@ -80,17 +99,47 @@ def test_lanes_and_the_axis_of_time():
     assert made[2, 1].tolist() == velocity(counts[2, 1], 1e3, "levant", **bounds).tolist()
 
 
-@pytest.mark.parametrize("rate", [1000.0, 777.7])
-def test_fdm_of_edges_is_the_difference_of_the_counts_at_the_samples(rate):
-    """An edge at the very time of a sample counts for it, and one behind it does not."""
+@pytest.mark.parametrize("start_s", [0.0, 1.0, -3.3, 1.7e9])
+@pytest.mark.parametrize("rate", [10.0, 1000.0, 777.7, 44.1e3])
+def test_fdm_of_edges_is_the_difference_of_the_counts_at_the_samples(rate, start_s):
+    """Edges at the times of samples, and between them: each counts at the sample at or after it."""
+    random = rng()
+    ticks = np.cumsum(random.integers(1, 9, 2000))  # quarters of a sample
+    times, counts = start_s + ticks / (4 * rate), np.cumsum(np.where(random.random(2000) < 0.3, -1, 1))
+    bounds = {"speed_max": 1e3 * rate, "acceleration_max": 1e3 * rate**2, "travel": 1e4}
+    made = velocity_of_edges(times, counts, rate, "fdm", clock_hz=64 * rate, **bounds)
+    since = ticks - ticks[0]
+    at = counts[np.searchsorted(since, 4 * np.arange(since[-1] // 4 + 1), side="right") - 1]
+    assert made == pytest.approx(np.diff(at) * rate, rel=1e-12)
+
+
+def test_times_of_nanoseconds_are_as_good_as_seconds():
     times, counts = walk()
-    made = velocity_of_edges(times, counts, rate, "fdm", speed_max=100e3, acceleration_max=1e6, travel=1e4)
-    at = times[0] + np.arange(len(made) + 1) / rate
-    # A clock of 100 MHz or more rounds times up by 10 ns: that is less than these times are apart from the samples.
-    assert np.abs(times[:, None] - at)[np.abs(times[:, None] - at) > 1e-12].min() > 1e-8 or rate == 1000.0
-    expected = np.diff(counts[np.searchsorted(times, at + 1e-12, side="right") - 1]) * rate
-    assert made == pytest.approx(expected, rel=1e-12)
-    assert len(made) == int((times[-1] - times[0]) * rate)
+    made = velocity_of_edges(times, counts, 1e3, "period", **WIDE)
+    stamps = np.datetime64("2026-11-28T21:00:00", "ns") + np.round(times * 1e9).astype("timedelta64[ns]")
+    assert velocity_of_edges(stamps, counts, 1e3, "period", **WIDE).tolist() == made.tolist()
+
+
+@pytest.mark.parametrize("rate", [1000, 10_000, 100_000])
+@pytest.mark.parametrize("estimator", STAMPED if LONG else ["period", "mt"])
+def test_edges_far_apart_are_those_of_the_hardware_at_that_rate(estimator, rate):
+    """The axis with true seconds, on edges 10 to 2000 samples apart, up to half a second."""
+    random = rng()
+    gaps = random.integers(10, min(2000, rate // 2), 200) * 1024 + random.integers(0, 1024, 200)
+    clocks = np.concatenate([[0], np.cumsum(gaps)])
+    counts = np.concatenate([[0], np.cumsum(np.where(random.random(200) < 0.1, -1, 1))])
+    bounds = {"acceleration_max": 40.0 * rate, "speed_max": 2.0 * rate, "travel": 2.0**20}
+    made = velocity_of_edges(clocks / (rate * 1024), counts, rate, estimator, clock_hz=rate * 1024, **bounds)
+    spec = AxisSpec(
+        clock_hz=rate * 1024, sample_hz=rate, actuation_hz=rate, count_m=1.0, travel_m=2.0**20, glitch_clocks=0,
+        speed_max_m_per_s=2.0 * rate, acceleration_max_m_per_s2=40.0 * rate, force_max_n=1.0, force_resolution_n=1.0,
+        stiffness_max_n_per_m=1.0, damping_max_n_s_per_m=1.0 / rate, estimator=estimator,
+    )  # fmt: skip
+    first = spec.design.timing.strobe - latency(0)
+    true = stamped.run(Axis(spec), first + clocks[1:], level(counts[1:]), len(made) + 1, int(level(0)))
+    # The second of the record is a power of two: gains and formats may differ by their rounding.
+    assert made == pytest.approx(true.velocity_m_per_s[1:], rel=1e-3, abs=1e-3 * np.abs(made).max())
+    assert np.abs(made).max() > 1
 
 
 @pytest.mark.parametrize("backend", ["fixed", "float"])
@@ -103,7 +152,8 @@ def test_a_steady_turn_is_known_from_its_edges_at_any_rate(estimator, backend):
             times, np.arange(800), 10 * scale, estimator, count=0.5, backend=backend, clock_hz=1e5 * scale,
             acceleration_max=10 * scale**2, speed_max=40 * scale, travel=400.0,
         )  # fmt: skip
-        assert made[-100:] == pytest.approx(37.5 / 2 * scale, rel=2e-3)
+        assert made[-100:].mean() == pytest.approx(37.5 / 2 * scale, rel=1e-3)
+        assert made[-100:] == pytest.approx(37.5 / 2 * scale, rel=5e-3)
 
 
 def test_edges_are_those_that_a_replay_makes_of_counts():
@@ -123,9 +173,9 @@ def test_edges_are_those_that_a_replay_makes_of_counts():
 
 
 def test_what_velocity_refuses():
-    with pytest.raises(ValueError, match=r"two samples or more along axis -1, not the shape \(1,\)"):
+    with pytest.raises(ValueError, match=r"two samples or more along axis -1, not 1"):
         velocity([1], 1e3)
-    with pytest.raises(ValueError, match=r"two samples or more along axis 2, not the shape \(4, 5\)"):
+    with pytest.raises(ValueError, match=r"axis 2 is out of bounds for array of dimension 2"):
         velocity(np.zeros((4, 5), np.int64), 1e3, axis=2)
     with pytest.raises(TypeError, match="counts must be integers, not float64"):
         velocity([1.5, 2.0], 1e3)
@@ -149,7 +199,7 @@ def test_what_velocity_of_edges_refuses():
 
     with pytest.raises(ValueError, match=r"must have one shape \(edges,\) of 2 or more, not \(3,\) and \(2,\)"):
         refused([0.0, 1.0, 2.0], [0, 1])
-    with pytest.raises(ValueError, match="times_s must increase, not from 1 to 1 at element 2"):
+    with pytest.raises(ValueError, match=r"times_s must increase, not from 1.0 to 1.0 at element 2"):
         refused([0.0, 1.0, 1.0], [0, 1, 2])
     with pytest.raises(ValueError, match="times_s must be finite, not nan at element 1"):
         refused([0.0, np.nan, 1.0], [0, 1, 2])
@@ -161,7 +211,11 @@ def test_what_velocity_of_edges_refuses():
         refused([0.0, 0.05], [0, 1])
     with pytest.raises(ValueError, match=r"must be a clock of .* s apart or more, not 1e-09 s at element 2; clock_hz"):
         refused([0.0, 0.123456, 0.123456 + 1e-9], [0, 1, 2], clock_hz=1e6)
-    with pytest.raises(ValueError, match=r"period has no words for this motion \(with 1024 samples a second: "):
+    with pytest.raises(ValueError, match=r"period has no words for this motion \(as if 1024 samples were a second: "):
         refused([0.0, 1.0, 1.0 + 1e-9], [0, 1, 2])
+    with pytest.raises(ValueError, match=r"at most 1e\+08 samples at 1000 Hz, not 2e\+09 in 2e\+06 s: are they in s"):
+        refused([0, 10**6, 2 * 10**6], [0, 1, 2], 1000.0)
+    with pytest.raises(ValueError, match=r"clock_hz must be 1e-06 to 2.81475e\+14, not nan"):
+        refused([0.0, 1.0], [0, 1], clock_hz=np.nan)
     with pytest.raises(TypeError, match="clock_hz must be a number, not 'x'"):
         refused([0.0, 1.0], [0, 1], clock_hz="x")

@@ -1,6 +1,8 @@
 """An axis a sample at a time: as the axis on the edges that exact arithmetic finds between the positions."""
 
+import copy
 import math
+import pickle
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
@@ -50,16 +52,16 @@ def edges_of(positions: list[float], clocks: int, first: int) -> tuple[list[int]
     return at, levels
 
 
-@pytest.mark.parametrize("floating", [False, True])
+@pytest.mark.parametrize("backend", ["fixed", "float"])
 @pytest.mark.parametrize("estimator", SOME)
-def test_it_is_the_axis_on_the_edges_between_the_positions(estimator, floating):
+def test_it_is_the_axis_on_the_edges_between_the_positions(estimator, backend):
     of, positions = replace(SPEC, estimator=estimator), walk()
-    sampler = Sampler(of, floating, **WALL)
+    sampler = Sampler(of, backend, **WALL)
     came = [(sampler(position), sampler.velocity_m_per_s, tuple(sampler.flags)) for position in positions]
     start = math.floor(positions[0] / COUNT_M)
     clocks, levels = edges_of(positions, of.clocks_per_sample, of.design.timing.strobe)
     # The decoder of a record starts at the count 0: the wall is moved as far.
-    axis = Axis(of, floating, **WALL, wall_position=-start * COUNT_M)
+    axis = Axis(of, backend == "float", **WALL, wall_position=-start * COUNT_M)
     record = stamped.run(axis, clocks, levels, len(positions), GRAY[start % 4])
     names = [tuple(of.design.flag_names(int(flags))) for flags in record.flags]
     assert came == list(zip(record.drive_n.tolist(), record.velocity_m_per_s.tolist(), names, strict=True))
@@ -118,6 +120,20 @@ def test_two_samplers_know_nothing_of_each_other():
     assert [force for force, _ in both] == [alone(position) for position in positions]
 
 
+def test_a_copy_goes_on_from_the_same_state():
+    positions = walk(60)
+    sampler = Sampler(replace(SPEC, estimator="window"), wall_stiffness=20e3, wall_damping=50.0)
+    assert [copy.deepcopy(sampler)(positions[0])] == [sampler(positions[0])]
+    for position in positions[1:30]:
+        sampler(position)
+    held = sampler.state
+    others = copy.deepcopy(sampler), copy.copy(sampler), pickle.loads(pickle.dumps(sampler))
+    first = [(sampler(position), sampler.velocity_m_per_s) for position in positions[30:]]
+    assert all(repr(other.state) == repr(held) for other in others)
+    for other in others:
+        assert [(other(position), other.velocity_m_per_s) for position in positions[30:]] == first
+
+
 def test_before_the_first_sample():
     sampler = Sampler(SPEC)
     assert (sampler.state, sampler.velocity_m_per_s, sampler.count, sampler.flags) == (None, 0.0, 0, [])
@@ -148,8 +164,15 @@ def test_what_is_refused():
     with pytest.raises(ValueError, match=r"parameter must be one of .* not 'wall_stifness'"):
         Sampler(SPEC, wall_stifness=1.0)
     sampler = Sampler(SPEC)
-    with pytest.raises(TypeError, match="position_m must be a number, not None"):
-        sampler(None)
+    for _ in range(2):
+        for wrong in (None, "0.001", True, [1.0]):
+            with pytest.raises(TypeError, match="position_m must be a number, not "):
+                sampler(wrong)
+        assert sampler(np.array(0.0)) == sampler(np.float32(0.0)) == sampler(0) == 0.0
+    with pytest.raises(ValueError, match="must be finite"):
+        sampler(10**400)
+    with pytest.raises(ValueError, match="backend must be one of fixed, float, not True"):
+        Sampler(SPEC, True)
     with pytest.raises(ValueError, match="wall_stiffness must be 0 to"):
         sampler.set(wall_stiffness=-1.0)
 

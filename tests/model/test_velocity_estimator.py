@@ -1,6 +1,7 @@
 """An estimator for records in pieces: the axis's own velocities, whole, in pieces, in lanes, with words that change."""
 
 import copy
+import pickle
 from dataclasses import replace
 from itertools import pairwise
 
@@ -66,9 +67,9 @@ def test_a_copy_goes_on_from_the_same_state():
     counts = swing()
     taken = VelocityEstimator(RATE, "window", MOTION)
     taken(counts[:1000])
-    other = copy.deepcopy(taken)
+    others = copy.deepcopy(taken), pickle.loads(pickle.dumps(taken))
     first = taken(counts[1000:])
-    assert other(counts[1000:]).tolist() == first.tolist()
+    assert [other(counts[1000:]).tolist() for other in others] == [first.tolist()] * 2
     taken.reset()
     assert taken(counts).tolist() == VelocityEstimator(RATE, "window", MOTION)(counts).tolist()
 
@@ -141,18 +142,16 @@ def test_what_is_refused():
     taken = VelocityEstimator(RATE, "levant", MOTION)
     with pytest.raises(TypeError, match="counts must be integers, not float64"):
         taken(swing() * 1.0)
-    with pytest.raises(ValueError, match="counts of 0 dimensions must have the axis -1"):
+    with pytest.raises(ValueError, match="axis -1 is out of bounds for array of dimension 0"):
         taken(3)
-    with pytest.raises(ValueError, match="counts of 1 dimensions must have the axis 1"):
+    with pytest.raises(ValueError, match="axis 1 is out of bounds for array of dimension 1"):
         taken(swing(), axis=1)
     taken(swing(10))
-    with pytest.raises(ValueError, match="counts must have 1 lanes as before, not 2"):
+    with pytest.raises(ValueError, match=r"lanes must have the shape \(\) as before, not \(2,\)"):
         taken(np.zeros((2, 5), np.int64))
     with pytest.raises(ValueError, match=r"must change by less than 1048576 .* not by 2000000 at sample 1$"):
         taken(np.array([0, 2_000_000]))
-    with pytest.raises(
-        ValueError, match=r"settings must broadcast against lanes of shape \(2,\), not levant_lambda of"
-    ):
+    with pytest.raises(ValueError, match=r"counts have lanes of shape \(2,\), and levant_lambda has the shape \(3,\)"):
         VelocityEstimator(RATE, "levant", MOTION, levant_lambda=[2.0, 3.0, 4.0])(np.zeros((2, 5), np.int64))
     with pytest.raises(ValueError, match="levant_output is no setting; accepted are levant_lambda, levant_alpha"):
         VelocityEstimator(RATE, "levant", MOTION, levant_output=1)
@@ -164,6 +163,58 @@ def test_what_is_refused():
         VelocityEstimator(RATE, "levant", MOTION, backend="rtl")
     with pytest.raises(ValueError, match=r"estimator must be one of fdm, .* not 'euler'"):
         VelocityEstimator(RATE, "euler", MOTION)
+
+
+def test_counters_of_a_few_bits_are_unwrapped_in_pieces():
+    counts = swing()
+    true = VelocityEstimator(RATE, "kalman", MOTION)(counts)
+    for bits, kind in ((16, np.uint16), (16, np.int16), (32, np.uint32), (17, np.int64)):
+        taken = VelocityEstimator(RATE, "kalman", MOTION, count_bits=bits)
+        read = (counts % 2**bits).astype(np.uint64).astype(kind)
+        pieces = np.concatenate([taken(read[:777]), taken(read[777:778]), taken(read[778:])])
+        assert pieces.tolist() == true.tolist()
+    with pytest.raises(ValueError, match=r"not by -65532 at sample 1; if the counter wraps, give count_bits=16"):
+        VelocityEstimator(RATE, "fdm", replace(MOTION, travel=1e-3))([65535, 3])
+    with pytest.raises(ValueError, match="count_bits must be 2 to 62, not 1"):
+        VelocityEstimator(RATE, "fdm", MOTION, count_bits=1)
+
+
+def test_a_call_that_is_refused_leaves_no_trace():
+    taken = VelocityEstimator(RATE, "kalman", MOTION)
+    for refused in ([0, 10**9], np.array([[0, 10**9], [0, 0]])):
+        with pytest.raises(ValueError, match="counts must change by less than"):
+            taken(refused)
+    counts = swing() + 5 * 10**6
+    assert taken(counts).tolist() == VelocityEstimator(RATE, "kalman", MOTION)(counts).tolist()
+
+
+def test_the_words_have_their_ranges_in_true_seconds():
+    taken = VelocityEstimator(RATE, "levant", MOTION)
+    words = {word.name: word for word in in_true_seconds(taken).design.estimator.words}
+    for name, word in taken.words.items():
+        assert (word.si_min, word.si_max) == pytest.approx((words[name].si_min, words[name].si_max))
+    taken.set(levant_lambda=taken.words["levant_lambda"].si_max)
+
+
+def test_a_setting_is_a_copy():
+    lambdas, counts = np.array([2.0, 5.0]), swing()
+    taken = VelocityEstimator(RATE, "levant", MOTION, levant_lambda=lambdas)
+    lambdas[:] = 10.0
+    same = VelocityEstimator(RATE, "levant", MOTION, levant_lambda=[2.0, 5.0])
+    assert taken(counts).tolist() == same(counts).tolist()
+    with pytest.raises(ValueError, match="levant_alpha must have a value at least"):
+        taken.set(levant_alpha=[])
+
+
+def test_gains_and_motions_of_another_kind_are_refused():
+    with pytest.raises(TypeError, match=r"gains must be kalman.Gains or None, not Gains\("):
+        VelocityEstimator(RATE, "kalman", MOTION, gains=levant.Gains(4.0, 30.0))
+    with pytest.raises(TypeError, match="motion must be a Motion, not None"):
+        VelocityEstimator(RATE, "kalman", None)
+    with pytest.raises(ValueError, match=r"travel must be 1e-06 to 536.871 with counts of 1e-06 at 10000 Hz, not"):
+        VelocityEstimator(RATE, "kalman", replace(MOTION, travel=1e-7))
+    with pytest.raises(ValueError, match="speed_max must be 0 to 167772 with counts of 1e-06 at 10000 Hz, not 1e"):
+        VelocityEstimator(RATE, "kalman", replace(MOTION, speed_max=1e9))
 
 
 def test_no_counts_are_no_velocities():

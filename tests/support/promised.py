@@ -22,7 +22,8 @@ from .pages import command_line
 
 FILE = Path(__file__).with_name("promised.txt")
 PYTHON = (
-    *(("model", name) for name in ("Motion", "Sampler", "VelocityEstimator", "velocity", "velocity_of_edges")),
+    *(("model", name) for name in ("Motion", "Sampler", "VelocityEstimator")),
+    *(("model", name) for name in ("velocity", "velocity_of_edges")),
     *(("model.axis", "Axis"), ("model.axis", "step"), ("model.spec", "AxisSpec"), ("model.stamped", "run")),
 )
 
