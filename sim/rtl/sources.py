@@ -4,9 +4,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ...hdl import export
+from ...model import register_header
 from ...model.axes.axis import AxesSpec
+from ...model.axes.registers import AxesMap
+from ...model.axis.registers import RegisterMap
 from ...model.runtime.input_error import InputError
-from ...model.runtime.whole_file import whole_file
 from ...model.spec import AxisSpec
 from ..boards.core import CORE, core
 from ..boards.description import Description
@@ -36,7 +38,7 @@ def files_around(spec: AxisSpec | AxesSpec, board: Description) -> dict[str, str
     return {**around(board, spec), **pages(board, spec), CORE: core(board, spec.clock_hz)}
 
 
-def write_verilog(spec: AxisSpec | AxesSpec, folder: Path, beside: Mapping[str, str]) -> list[Path]:
+def write_verilog(spec: AxisSpec | AxesSpec, folder: Path, beside: Mapping[str, str]) -> tuple[Path, ...]:
     """Write the Verilog of one axis or several, its ports, its registers and the waivers of its lint; return the paths.
 
     Args:
@@ -48,13 +50,11 @@ def write_verilog(spec: AxisSpec | AxesSpec, folder: Path, beside: Mapping[str, 
         OtherClockError: if the folder has the `top` of a board for another clock, which this does not replace.
         OSError: if the files cannot be written.
     """
-    texts = {WAIVERS.name: WAIVERS.read_text(encoding="utf-8"), **beside}
+    registers = AxesMap(spec) if isinstance(spec, AxesSpec) else RegisterMap(spec)
+    header, waivers = register_header.header(registers), WAIVERS.read_text(encoding="utf-8")
+    texts = {"registers.h": header, WAIVERS.name: waivers, **beside}
     _check_tops(folder, spec.clock_hz, set(texts))
-    paths = export.write(spec, folder)
-    for name, text in texts.items():
-        with whole_file(folder / name) as part:
-            part.write_text(text, encoding="utf-8", newline="\n")
-    return [*paths, *(folder / name for name in texts)]
+    return export.write(spec, folder, texts)
 
 
 def _check_tops(folder: Path, clock_hz: int, replaced: set[str]) -> None:

@@ -1,5 +1,6 @@
 """The files of `hardwall verilog`: whole for a board, with their waivers, and never beside the top of another clock."""
 
+import json
 import subprocess
 
 import pytest
@@ -16,6 +17,7 @@ from hardwall.sim.scene.load import load
 from support.command_line import call
 
 AROUND = {"top.v", "WIRING.md", "wiring.svg", "hardwall.core"}
+USUAL = {"board.v", "registers.h", "lint.vlt"}
 PINS = {"icebreaker": "icebreaker.pcf", "tangnano9k": "tangnano9k.cst", "ulx3s-25f": "ulx3s.lpf"}
 MHZ = load("mhz").spec
 
@@ -24,9 +26,10 @@ MHZ = load("mhz").spec
 def quick(monkeypatch):
     """Write no Verilog of the axis: a stand-in has its clock."""
 
-    def write(spec, folder):
-        (folder / "board.v").write_text(f"// {spec.clock_hz} Hz\n")
-        return (folder / "board.v",)
+    def write(spec, folder, beside):
+        for name, text in {"board.v": f"// {spec.clock_hz} Hz\n", **beside}.items():
+            (folder / name).write_text(text)
+        return tuple(folder / name for name in ("board.v", *beside))
 
     monkeypatch.setattr(sources.export, "write", write)
 
@@ -35,7 +38,7 @@ def quick(monkeypatch):
 def test_one_command_writes_all_of_a_board_for_one_clock(quick, name, tmp_path, monkeypatch, capsys):
     code, out, err = call(monkeypatch, capsys, "verilog", "--board", name, "-o", str(tmp_path))
     assert code == 0, err
-    assert {line.rpartition("/")[2] for line in out.splitlines()} == {"board.v", "lint.vlt", PINS[name], *AROUND}
+    assert {line.rpartition("/")[2] for line in out.splitlines()} == {*USUAL, PINS[name], *AROUND}
     clock_hz = load(BOARDS[name].scene, BOARDS[name].changes).spec.clock_hz
     assert (tmp_path / "board.v").read_text() == f"// {clock_hz} Hz\n"
     assert made_for((tmp_path / "top.v").read_text()) == (BOARDS[name].title, clock_hz)
@@ -88,7 +91,18 @@ def test_the_waivers_beside_the_verilog_are_enough(tmp_path):
     spec = load(BOARDS["icebreaker"].scene, BOARDS["icebreaker"].changes).spec
     paths = write_verilog(spec, tmp_path, files_around(spec, BOARDS["icebreaker"]))
     assert {path.name for path in paths} == {path.name for path in tmp_path.iterdir()}
+    identity = json.loads((tmp_path / "registers.json").read_text())["identity"]
+    assert f'#define HARDWALL_IDENTITY "{identity}"\n' in (tmp_path / "registers.h").read_text()
     for top in ("axis", "axi", "board"):
         lint = ["verilator", "--lint-only", "-Wall", "lint.vlt", "--top-module", top, f"{top}.v"]
         done = subprocess.run(lint, cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False)
         assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_the_header_of_several_axes_is_that_of_their_registers(tmp_path):
+    paths = write_verilog(AxesSpec(axes=2, **load("mhz").requirements), tmp_path, {})
+    assert {path.name for path in paths} == {path.name for path in tmp_path.iterdir()}
+    identity = json.loads((tmp_path / "registers.json").read_text())["identity"]
+    header = (tmp_path / "registers.h").read_text()
+    assert f'#define HARDWALL_IDENTITY "{identity}"\n' in header
+    assert "#define HARDWALL_BANKS 2\n" in header
