@@ -9,7 +9,7 @@ from pathlib import Path
 from ...model.checks import shown
 from ...model.spec import AxisSpec
 from .errors import SceneError
-from .load import load
+from .load import load as loaded
 
 __all__ = ["SceneError", "spec"]
 
@@ -29,4 +29,4 @@ def spec(scene: str | Path) -> AxisSpec:
     """
     if not isinstance(scene, str | Path):
         raise TypeError(f"scene must be a name or a path, not {shown(scene)}")
-    return load(str(scene)).spec
+    return loaded(str(scene)).spec
