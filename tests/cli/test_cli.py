@@ -10,11 +10,11 @@ import pytest
 
 from hardwall.cli.terminal import show
 from hardwall.model.runtime.result import Table
-from hardwall.sim.scene.load import FOLDER, names
+from hardwall.sim.scene import load
 from stimuli.scenes import SHORT_OF_AXES
 from support.command_line import call
 
-SEED = (FOLDER / "seed-2011.toml").read_text()
+SEED = (load.FOLDER / "seed-2011.toml").read_text()
 STIFFNESS = "0, or 1.95313 (half of its word's LSB) to 200000 (what the controller is for)"
 DAMPING = "0, or 0.003125 (half of its word's LSB) to 400 (what the controller is for)"
 """What the wall of the scene `seed-2011` may be."""
@@ -25,10 +25,10 @@ OF_ONE_AXIS_ALONE = ("bench", "cutoff", "drop", "fit", "gains", "lipschitz", "ra
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["hit", "no-such"], f"scene must be one of {', '.join(names())}, or a .toml file, not 'no-such'"),
+        (["hit", "no-such"], f"scene must be one of {', '.join(load.names())}, or a .toml file, not 'no-such'"),
         (
             ["hit", "no-such.toml"],
-            f"scene must be one of {', '.join(names())}, or a .toml file, not 'no-such.toml'",
+            f"scene must be one of {', '.join(load.names())}, or a .toml file, not 'no-such.toml'",
         ),
         (
             ["hit", "--set", "handle.mas_kg=1"],
