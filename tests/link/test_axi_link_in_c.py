@@ -2,6 +2,7 @@
 
 import ctypes
 import logging
+import re
 import subprocess
 from pathlib import Path
 
@@ -136,3 +137,12 @@ def test_with_a_pointer_the_example_stores_at_the_byte_offset(tmp_path):
     # The pulse has an odd address: it is the lower half of its word, and so the first two bytes.
     assert registers["arm"].address % 2
     assert memory[2 * (registers["arm"].address - 1)] == 1
+
+
+def test_the_program_on_the_page_compiles(tmp_path):
+    blocks = re.findall(r"```c\n(.*?)^```$", (ROOT / "docs/reference/link.md").read_text(), re.DOTALL | re.MULTILINE)
+    (program,) = (block for block in blocks if "axis_arm" in block)
+    compiled(tmp_path, hooked=False)
+    (tmp_path / "main.c").write_text(f'#include "{EXAMPLE}"\nint main(void)\n{{\n{program}}}\n', encoding="utf-8")
+    command = ["cc", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "-I.", "main.c"]
+    subprocess.run(command, cwd=tmp_path, check=True)
