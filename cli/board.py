@@ -1,7 +1,7 @@
 """The command `board`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -22,7 +22,7 @@ from .study import StudyOptions, study
 from .terminal import log
 
 
-def _boards(incomplete: str) -> list[str]:
+def boards_beginning(incomplete: str) -> list[str]:
     """Return the boards whose names begin so, for the completion of a shell."""
     return [name for name in BOARDS if name.startswith(incomplete)]
 
@@ -30,7 +30,7 @@ def _boards(incomplete: str) -> list[str]:
 @study("set_")
 def command(
     options: StudyOptions,
-    board: Annotated[str, typer.Argument(metavar="BOARD", help=", ".join(BOARDS), autocompletion=_boards)],
+    board: Annotated[str, typer.Argument(metavar="BOARD", help=", ".join(BOARDS), autocompletion=boards_beginning)],
     folder: Annotated[
         str, typer.Option("-o", "--output-folder", metavar="DIR", help="folder for the files, new or written before")
     ],
@@ -40,12 +40,10 @@ def command(
     seeds: Annotated[int, typer.Option(min=1, max=99, help="most placements until one reaches the clock")] = 5,
     program: Annotated[Memory | None, typer.Option(help="put the bitstream into the board that is connected")] = None,
 ) -> None:
-    if board not in BOARDS:
-        raise BadInput(f"board must be one of {', '.join(BOARDS)}, not {shown(board)}")
-    on = BOARDS[board]
+    on = board_named("board", board)
     if program and program not in on.loads:
         raise BadInput(f"--program must be one of {', '.join(on.loads)} for {on.name}, not {program!r}")
-    of = scene_on(on, options, scene, estimator)
+    of = scene_on(on, options.changes(controller__estimator=estimator), scene)
     path = _free(folder)
     order = Order(on, of.name, spec_on(of, axes), of.glitch_clocks, seeds)
     with log.status(f"{on.name}: Yosys, then nextpnr until a seed reaches {of.spec.clock_hz / 1e6:g} MHz"):
@@ -58,9 +56,15 @@ def command(
             load_into(on, path / report["bitstream"], program, report["sha256"])
 
 
-def scene_on(board: Description, options: StudyOptions, scene: str | None, estimator: str | None) -> Scene:
+def board_named(option: str, name: str) -> Description:
+    """Return the board with the name that an option or an argument has."""
+    if name not in BOARDS:
+        raise BadInput(f"{option} must be one of {', '.join(BOARDS)}, not {shown(name)}")
+    return BOARDS[name]
+
+
+def scene_on(board: Description, changes: dict[str, Any], scene: str | None) -> Scene:
     """Return the scene that a board is to run: its own, at a clock that it makes, if none is given."""
-    changes = options.changes(controller__estimator=estimator)
     return load(scene, changes) if scene is not None else load(board.scene, board.changes | changes)
 
 

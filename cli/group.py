@@ -17,7 +17,7 @@ COMMANDS = {
     "replay": "Put recorded counts, or captured edges, through an estimator; the RTL gets them through its pins.",
     "table": "Print reports of hits side by side.",
     "bench": "Measure the closed loop's speed on every backend and under cocotb, and what optional parts cost.",
-    "verilog": "Write the axis of a scene as Verilog, with a table of its ports.",
+    "verilog": "Write the axis of a scene as Verilog, with a table of its ports, and what a board needs around it.",
     "virtual": "Run the board of a scene, with its plant, behind a serial port that a host opens.",
     "connect": "What the board at a port is: its identity, its state, why it tripped, and every register.",
     "set": "Write words of a board, in SI units, and commit them together.",

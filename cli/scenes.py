@@ -24,19 +24,18 @@ def _scenes(incomplete: str) -> list[str]:
     return [name for name in names() if name.startswith(incomplete)]
 
 
-SceneArgument = Annotated[
-    str,
-    typer.Argument(metavar="SCENE", help=f"{', '.join(names())}, or a .toml file", autocompletion=_scenes),
-]
-SceneOfBoardArgument = Annotated[
-    str | None,
-    typer.Argument(
-        metavar="SCENE",
-        help=f"{', '.join(names())}, or a .toml file",
-        autocompletion=_scenes,
-        show_default="the board's own, at a clock that it makes",
-    ),
-]
+def _scene_argument(kind: Any, default: bool | str) -> Any:
+    """Return the type of the argument that names a scene, whose help says what stands for none."""
+    said = f"{', '.join(names())}, or a .toml file"
+    argument = typer.Argument(metavar="SCENE", help=said, autocompletion=_scenes, show_default=default)
+    return Annotated[kind, argument]
+
+
+SceneArgument = _scene_argument(str, True)
+SceneOfBoardArgument = _scene_argument(str | None, "the board's own, at a clock that it makes")
+SceneOrOfBoardArgument = _scene_argument(
+    str | None, "seed-2011; with --board the board's own, at a clock that it makes"
+)
 DeviceOption = Annotated[PartName, typer.Option(help="the part to place and route for")]
 EncoderSetOption = Annotated[
     list[str] | None,

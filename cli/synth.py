@@ -19,7 +19,7 @@ def command(
     estimator: EstimatorOption = None,
     axes: AxesOption = None,
 ) -> None:
-    of = scene_on(board_of(device), options, scene, estimator)
+    of = scene_on(board_of(device), options.changes(controller__estimator=estimator), scene)
     with log.status(f"{device}: Yosys, then nextpnr with {seeds} seeds"):
         report = synthesise(spec_on(of, axes), device, range(1, seeds + 1), of.glitch_clocks)
     options.finish(Values({"scene": of.name} | report))

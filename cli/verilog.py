@@ -6,29 +6,45 @@ from typing import Annotated
 import typer
 
 from ..model.checks import shown
-from ..sim.rtl.sources import write_verilog
+from ..sim.boards.description import BOARDS
+from ..sim.rtl.sources import files_around, write_verilog
 from ..sim.scene.load import load
-from .board import spec_on
+from .board import board_named, boards_beginning, scene_on, spec_on
 from .errors import BadInput
 from .options import AxesOption, EstimatorOption, SetOption
-from .scenes import SceneArgument, changes_of
+from .scenes import SceneOrOfBoardArgument, changes_of
+
+DEFAULT = "seed-2011"
+"""The scene if none is given, nor a board that has its own."""
 
 
 def command(
-    scene: SceneArgument = "seed-2011",
+    scene: SceneOrOfBoardArgument = None,
     folder: Annotated[
         str, typer.Option("-o", "--output-folder", metavar="DIR", help="folder for the files, made if absent")
     ] = ".",
+    board: Annotated[
+        str | None,
+        typer.Option(
+            metavar="BOARD",
+            help=f"write its top, pins and a core for FuseSoC too: {', '.join(BOARDS)}",
+            autocompletion=boards_beginning,
+            show_default="none",
+        ),
+    ] = None,
     estimator: EstimatorOption = None,
     axes: AxesOption = None,
     set_: SetOption = None,
 ) -> None:
-    spec = spec_on(load(scene, changes_of(set_, controller__estimator=estimator)), axes)
+    on = None if board is None else board_named("--board", board)
+    changes = changes_of(set_, controller__estimator=estimator)
+    spec = spec_on(scene_on(on, changes, scene) if on else load(scene or DEFAULT, changes), axes)
+    beside = files_around(spec, on) if on else {}
     if not folder:
         raise BadInput("-o must be a folder, not ''")
     try:
         Path(folder).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise BadInput(f"-o {shown(folder)} cannot be made: {error.strerror}") from None
-    for path in write_verilog(spec, Path(folder)):
+    for path in write_verilog(spec, Path(folder), beside):
         print(path)

@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -124,10 +124,9 @@ def _source(component: Described, name: str, what: str) -> str:
 
 
 def _registers(registers: RegisterMap) -> dict[str, str]:
-    """Return the files of a register map, by name."""
+    """Return the pages of a register map, by name."""
     return {
         "registers.md": register_texts.markdown(registers),
-        "registers.h": register_texts.c_header(registers),
         "registers.json": register_texts.as_json(registers),
     }
 
@@ -192,18 +191,23 @@ def _files_of_axes(spec: AxesSpec) -> dict[str, str]:
     }
 
 
-def write(spec: AxisSpec | AxesSpec, folder: Path) -> tuple[Path, ...]:
+def write(spec: AxisSpec | AxesSpec, folder: Path, beside: Mapping[str, str]) -> tuple[Path, ...]:
     """Write the Verilog, its ports and its registers into `folder`, which is made if it is missing; return the paths.
 
     Of an axis, `axis.v`, `board.v` and `axi.v` have their ports in `ports.md`; the registers of the last two are in
-    `registers.md`, `registers.h` for C, and `registers.json`. Of several axes there are `axes.v` and `board.v`, and the
-    same pages of both. The text depends only on the spec and on the versions of this project and its Yosys.
+    `registers.md` and `registers.json`. Of several axes there are `axes.v` and `board.v`, and the same pages of both.
+    The text depends only on the spec and on the versions of this project and its Yosys.
+
+    Args:
+        spec: the axis, or several.
+        folder: the folder.
+        beside: the texts of further files, by name.
 
     Raises:
         TypeError: if `spec` is neither an AxisSpec nor an AxesSpec.
         OSError: if a file cannot be written.
     """
-    files = _files_of_axes(spec) if isinstance(spec, AxesSpec) else _files(spec)
+    files = {**(_files_of_axes(spec) if isinstance(spec, AxesSpec) else _files(spec)), **beside}
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():

@@ -1,5 +1,6 @@
 """The Verilog around `board` on a part: its clock from the board's oscillator, the internal one, and the pads."""
 
+import re
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -9,6 +10,8 @@ from .signals import OF_AXIS, OF_STAGE, SHARED_LOOPS, USUAL, Signal, signals_of,
 MODULE = "top"
 INSIDE = {"oscillator", "outputs_enable"}
 """Ports of `board` that are no pins."""
+CLOCK = re.compile(r"// (.+): the clock of `board` is (\d+) Hz")
+"""How a file with `top` begins: the board, and the clock of the axis."""
 WITHOUT_PLL = """\
     assign clk = pin;
     assign locked = 1'b1;
@@ -44,6 +47,12 @@ def top_of_axes(board: Description, clock_hz: int, axes: int) -> str:
         pins = (f"{name}_{axis}" for axis in reversed(range(axes)))
         connected[name] = f"{{{', '.join(pads.get(pin, pin) for pin in pins)}}}"
     return _verilog(Top(board, clock_hz, signals_of_axes(axes), pads, connected, "pull-downs"))
+
+
+def made_for(text: str) -> tuple[str, int] | None:
+    """Return the board and the clock (Hz) of a `top` that this module wrote; None for any other text."""
+    found = CLOCK.match(text)
+    return (found[1], int(found[2])) if found else None
 
 
 class Top(NamedTuple):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from ...model import register_texts
+from ...model import register_header, register_texts
 from ...model.axes.axis import AxesSpec
 from ...model.runtime.result import text_of
 from ...model.spec import AxisSpec
@@ -108,9 +108,9 @@ def _fill(order: Order, design: Design, runs: list[Placed], report: dict, work: 
     registers = design.top.registers
     texts = {
         "registers.md": register_texts.markdown(registers),
-        "registers.h": register_texts.c_header(registers),
+        "registers.h": register_header.header(registers),
         "registers.json": register_texts.as_json(registers),
-        **_pages(board, order.spec),
+        **pages(board, order.spec),
         "report.json": json.dumps(report, indent=2) + "\n",
         "report.txt": "".join(f"{key}: {text_of(value)}\n" for key, value in report.items()),
     }
@@ -118,7 +118,7 @@ def _fill(order: Order, design: Design, runs: list[Placed], report: dict, work: 
         (work / name).write_text(text, encoding="utf-8", newline="\n")
 
 
-def _pages(board: Description, spec: AxisSpec | AxesSpec) -> dict[str, str]:
+def pages(board: Description, spec: AxisSpec | AxesSpec) -> dict[str, str]:
     """Return what says what to connect: a page, and for an axis alone a picture."""
     if isinstance(spec, AxesSpec):
         return {"WIRING.md": wiring_of_axes(board, spec)}

@@ -73,12 +73,24 @@ def sources(board: Description, top: Board | AxesBoard) -> dict[str, str]:
     Raises:
         ClockError: if the board cannot make the clock of the axis.
     """
-    spec = top.spec
+    return {"board.v": to_verilog(top, "board"), **around(board, top.spec)}
+
+
+def around(board: Description, spec: AxisSpec | AxesSpec) -> dict[str, str]:
+    """Return the text of the files around `board.v`: `top`, and the pins.
+
+    Args:
+        board: the board; for several axes with their pins, `Description.of_axes`.
+        spec: the axis, or several.
+
+    Raises:
+        ClockError: if the board cannot make the clock of the axis.
+    """
     if isinstance(spec, AxesSpec):
-        around = top_of_axes(board, spec.clock_hz, spec.axes), constraints_of(board, signals_of_axes(spec.axes))
+        top, pins = top_of_axes(board, spec.clock_hz, spec.axes), constraints_of(board, signals_of_axes(spec.axes))
     else:
-        around = top_verilog(board, spec.clock_hz, spec.stage.name), constraints(board, spec.stage.name)
-    return {"board.v": to_verilog(top, "board"), "top.v": around[0], Files.of(board).pins: around[1]}
+        top, pins = top_verilog(board, spec.clock_hz, spec.stage.name), constraints(board, spec.stage.name)
+    return {"top.v": top, Files.of(board).pins: pins}
 
 
 def netlist(name: str, part: Part, texts: Mapping[str, str], clock_hz: int) -> Path:

@@ -1,16 +1,69 @@
 """The Verilog of an axis, or of several, as files, for use in another tool flow."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from ...hdl import export
+from ...model import register_header
 from ...model.axes.axis import AxesSpec
+from ...model.axes.registers import AxesMap
+from ...model.axis.registers import RegisterMap
+from ...model.runtime.input_error import InputError
 from ...model.spec import AxisSpec
+from ..boards.core import CORE, core
+from ..boards.description import Description
+from ..boards.top import made_for
+from .bitstream import pages
+from .flow import around
+
+WAIVERS = Path(__file__).with_name("lint.vlt")
+"""What `verilator -Wall` finds in the style of the Verilog, and why it is waived."""
+LONGEST = 1000
+"""The most letters of a file that are read to know what it is."""
 
 
-def write_verilog(spec: AxisSpec | AxesSpec, folder: Path) -> list[Path]:
-    """Write the Verilog of one axis or several, its ports and its registers into an existing folder; return the paths.
+class OtherClockError(InputError):
+    """A folder has the `top` of a board for another clock; one line that names both."""
+
+
+def files_around(spec: AxisSpec | AxesSpec, board: Description) -> dict[str, str]:
+    """Return what a board needs beside `board.v`, by name: `top`, pins, what to connect to them, a core for FuseSoC.
 
     Raises:
+        FieldError: if the board has no pins for so many axes.
+        ClockError: if the board cannot make the clock of the axis.
+    """
+    if isinstance(spec, AxesSpec):
+        board = board.of_axes(spec.axes)
+    return {**around(board, spec), **pages(board, spec), CORE: core(board, spec.clock_hz)}
+
+
+def write_verilog(spec: AxisSpec | AxesSpec, folder: Path, beside: Mapping[str, str]) -> tuple[Path, ...]:
+    """Write the Verilog of one axis or several, its ports, its registers and the waivers of its lint; return the paths.
+
+    Args:
+        spec: the axis, or several.
+        folder: an existing folder.
+        beside: the text of further files by name, as `files_around` returns it.
+
+    Raises:
+        OtherClockError: if the folder has the `top` of a board for another clock, which this does not replace.
         OSError: if the files cannot be written.
     """
-    return export.write(spec, folder)
+    registers = AxesMap(spec) if isinstance(spec, AxesSpec) else RegisterMap(spec)
+    header, waivers = register_header.header(registers), WAIVERS.read_text(encoding="utf-8")
+    texts = {"registers.h": header, WAIVERS.name: waivers, **beside}
+    _check_tops(folder, spec.clock_hz, set(texts))
+    return export.write(spec, folder, texts)
+
+
+def _check_tops(folder: Path, clock_hz: int, replaced: set[str]) -> None:
+    """Raise OtherClockError if a folder has a `top` for another clock than that of `board.v`, and it stays."""
+    for path in sorted(path for path in folder.glob("*.v") if path.is_file() and path.name not in replaced):
+        with path.open(encoding="utf-8", errors="replace") as file:
+            found = made_for(file.readline(LONGEST))
+        if found and found[1] != clock_hz:
+            raise OtherClockError(
+                f"{path} is the top of {found[0]} for a clock of {found[1]} Hz, and the scene has {clock_hz} Hz: "
+                "write each board into a folder of its own, with --board"
+            )

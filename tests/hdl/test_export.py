@@ -20,7 +20,7 @@ from stimuli.specs import spec
 from support.tables import rows, verilog_ports
 
 TOPS = {"axis": Axis, "board": Board, "axi": lambda axis: Board(axis, AxiLink(RegisterMap(axis)))}
-WRITTEN = ("axis.v", "axi.v", "board.v", "ports.md", "registers.md", "registers.h", "registers.json")
+WRITTEN = ("axis.v", "axi.v", "board.v", "ports.md", "registers.md", "registers.json", "beside.txt")
 # Designs that instantiate the axis depend on these names; the words depend on its estimator.
 AXIS_PORTS = """
 clk rst encoder_a encoder_b encoder_z drive_enable clear_flags preload origin_shift preload_count slip index_arm
@@ -90,7 +90,7 @@ def test_other_components_are_refused():
 @pytest.fixture(scope="module")
 def written(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("verilog") / "made"
-    assert write(spec("mhz"), folder) == tuple(folder / name for name in WRITTEN)
+    assert write(spec("mhz"), folder, {"beside.txt": "any text\n"}) == tuple(folder / name for name in WRITTEN)
     return folder
 
 
@@ -99,7 +99,7 @@ def test_a_disk_that_is_full_truncates_no_file(written, tmp_path):
     program = (
         "import resource, sys; from stimuli.specs import spec; from hardwall.hdl import export; "
         "export.to_verilog = lambda component, name: 'x' * 5000; "
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000)); export.write(spec('mhz'), sys.argv[1])"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000)); export.write(spec('mhz'), sys.argv[1], {})"
     )
     (tmp_path / "axis.v").write_text("an older axis")
     command = [sys.executable, "-c", program, str(tmp_path)]
@@ -175,14 +175,13 @@ def test_written_tables_are_all_there(written):
 def test_written_registers_are_those_of_the_board(written):
     registers = Board(spec("mhz")).registers
     assert (written / "registers.md").read_text() == register_texts.markdown(registers)
-    assert (written / "registers.h").read_text() == register_texts.c_header(registers)
     assert (written / "registers.json").read_text() == register_texts.as_json(registers)
 
 
 def test_text_is_the_same_in_another_process(written, tmp_path):
     program = (
         "import sys; from stimuli.specs import spec; from hardwall.hdl.export import write; "
-        "write(spec('mhz'), sys.argv[1])"
+        "write(spec('mhz'), sys.argv[1], {'beside.txt': 'any text\\n'})"
     )
     command = [sys.executable, "-c", program, str(tmp_path)]
     subprocess.run(command, cwd=Path(__file__).parents[1], env=environment() | {"PYTHONHASHSEED": "7"}, check=True)

@@ -18,7 +18,7 @@ from stimuli.lengths import LONG
 from support.tables import rows, verilog_ports
 
 TOPS = {"axes": Axes, "board": AxesBoard}
-WRITTEN = ("axes.v", "board.v", "ports.md", "registers.md", "registers.h", "registers.json")
+WRITTEN = ("axes.v", "board.v", "ports.md", "registers.md", "registers.json")
 
 
 def several(axes: int, estimator: str = "levant") -> AxesSpec:
@@ -28,7 +28,7 @@ def several(axes: int, estimator: str = "levant") -> AxesSpec:
 @pytest.fixture(scope="module")
 def written(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("verilog") / "made"
-    assert write(several(3), folder) == tuple(folder / name for name in WRITTEN)
+    assert write(several(3), folder, {}) == tuple(folder / name for name in WRITTEN)
     return folder
 
 
@@ -80,5 +80,4 @@ def test_written_tables_have_the_ports_the_words_and_the_registers(written):
         assert f"\n| {number} | `{word.name}` | {word.format} | {word.reset} | {word.doc} |\n" in text
     registers = AxesMap(spec)
     assert (written / "registers.md").read_text() == register_texts.markdown(registers)
-    assert (written / "registers.h").read_text() == register_texts.c_header(registers)
     assert (written / "registers.json").read_text() == register_texts.as_json(registers)
