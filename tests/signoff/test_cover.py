@@ -46,6 +46,7 @@ OF_THE_BENCH = {
         "testing/test_campaign",
         "link/test_mbpoll",
         "link/test_axi_link",
+        "link/test_axi_link_in_c",
         "estimators/test_edge_kalman_map",
     )
 }

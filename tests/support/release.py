@@ -82,10 +82,13 @@ def licences(extras: Iterable[str]) -> str:
         classified = [
             each.rpartition(" :: ")[2] for each in metadata.get_all("Classifier") or [] if "License ::" in each
         ]
-        said = (
-            metadata["License-Expression"] or " and ".join(classified) or (metadata["License"] or "").partition("\n")[0]
+        stated = (
+            metadata.get("License-Expression"),
+            " and ".join(classified),
+            metadata.get("License", "").partition("\n")[0],
         )
-        lines.append(f"{name} {metadata['Version']}: {said or 'see its files'}")
+        said = next(filter(None, stated), "see its files")
+        lines.append(f"{name} {metadata['Version']}: {said}")
     return "\n".join(lines) + "\n"
 
 

@@ -2,6 +2,7 @@
 
 import json
 import subprocess
+from pathlib import Path
 
 import pytest
 
@@ -36,13 +37,14 @@ def quick(monkeypatch):
 
 @pytest.mark.parametrize("name", PINS)
 def test_one_command_writes_all_of_a_board_for_one_clock(quick, name, tmp_path, monkeypatch, capsys):
-    code, out, err = call(monkeypatch, capsys, "verilog", "--board", name, "-o", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    code, out, err = call(monkeypatch, capsys, "verilog", "--board", name, "-o", "out")
     assert code == 0, err
     assert {line.rpartition("/")[2] for line in out.splitlines()} == {*USUAL, PINS[name], *AROUND}
     clock_hz = load(BOARDS[name].scene, BOARDS[name].changes).spec.clock_hz
-    assert (tmp_path / "board.v").read_text() == f"// {clock_hz} Hz\n"
-    assert made_for((tmp_path / "top.v").read_text()) == (BOARDS[name].title, clock_hz)
-    assert f"the clock of the axis is {clock_hz} Hz" in (tmp_path / "hardwall.core").read_text()
+    assert (Path("out") / "board.v").read_text() == f"// {clock_hz} Hz\n"
+    assert made_for((Path("out") / "top.v").read_text()) == (BOARDS[name].title, clock_hz)
+    assert f"the clock of the axis is {clock_hz} Hz" in (Path("out") / "hardwall.core").read_text()
 
 
 def test_a_clock_that_a_board_cannot_make_writes_nothing(quick, tmp_path, monkeypatch, capsys):
@@ -55,19 +57,21 @@ def test_a_clock_that_a_board_cannot_make_writes_nothing(quick, tmp_path, monkey
 
 
 def test_a_top_for_another_clock_is_not_left_beside_the_board(quick, tmp_path, monkeypatch, capsys):
-    call(monkeypatch, capsys, "verilog", "--board", "icebreaker", "-o", str(tmp_path))
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    code, _, err = call(monkeypatch, capsys, "verilog", "mhz", "-o", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    out = Path("out")
+    call(monkeypatch, capsys, "verilog", "--board", "icebreaker", "-o", "out")
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    code, _, err = call(monkeypatch, capsys, "verilog", "mhz", "-o", "out")
     assert (code, err) == (
         2,
-        f"hardwall: error: {tmp_path}/top.v is the top of iCEBreaker v1.0e for a clock of 24000000 Hz, and the scene "
+        "hardwall: error: out/top.v is the top of iCEBreaker v1.0e for a clock of 24000000 Hz, and the scene "
         "has 50000000 Hz: write each board into a folder of its own, with --board\n",
     )
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
     # The same clock may be written again, and another board replaces the top.
-    write_verilog(load("mhz", BOARDS["icebreaker"].changes).spec, tmp_path, {})
-    write_verilog(MHZ, tmp_path, files_around(MHZ, BOARDS["ulx3s-25f"]))
-    assert made_for((tmp_path / "top.v").read_text())[1] == MHZ.clock_hz
+    write_verilog(load("mhz", BOARDS["icebreaker"].changes).spec, out, {})
+    write_verilog(MHZ, out, files_around(MHZ, BOARDS["ulx3s-25f"]))
+    assert made_for((out / "top.v").read_text())[1] == MHZ.clock_hz
 
 
 def test_the_folder_of_constraints_takes_no_axis_of_another_clock(quick, tmp_path):
