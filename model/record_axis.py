@@ -10,37 +10,37 @@ from .encoder.quadrature_speed import max_edge_rate
 from .estimators import registry
 from .estimators.estimate import EstimatorGains
 from .motion import TRAVEL_MAX, Motion
-from .record_time import SECOND, RecordTime
+from .record_time import RecordTime
 from .spec import AxisSpec
 
 GLITCH_CLOCKS = 0
 """The glitch filter: edges that are computed have no glitches, and are never too fast for the decoder alone."""
 DECODER_CLOCKS = quadrature.latency(GLITCH_CLOCKS)
 """The latency of the decoder: an edge this many clocks before a strobe is the last that is counted at it."""
-CLOCKS = 1 << 16
-"""The clocks of a sample with which a design is tried first."""
+CLOCKS, CLOCKS_A_SECOND = 1 << 16, 1 << 36
+"""The clocks of a sample and of a second with which a design is tried first, of which it takes the fewer."""
 STEP_MAX = 2.0**24
 """The largest bound on the speed, counts a sample."""
 
 
-def idle_axis(fastest: float, clocks: float = 1, second: int = SECOND, **requirements: Any) -> AxisSpec:
+def idle_axis(time: RecordTime, fastest: float, clocks: float = 1, **requirements: Any) -> AxisSpec:
     """Return the specification of an axis whose wall and output stage are idle.
 
     A sample has clocks enough for the force path and for the fastest change through the decoder, a power of two.
 
     Args:
+        time: the record's sample rate; the requirements are in the axis's seconds.
         fastest: the largest change of the count in a sample.
         clocks: the fewest clocks of a sample.
-        second: samples a second.
         requirements: count, travel, bounds, estimator and gains, by their names in `AxisSpec`.
 
     Raises:
         TypeError: if a requirement is of the wrong type.
         ValueError: if a requirement is impossible.
     """
-    count = requirements["count_m"]
+    count, second = requirements["count_m"], time.second
     spec = AxisSpec(
-        clock_hz=second * CLOCKS,
+        clock_hz=min(second * CLOCKS, CLOCKS_A_SECOND),
         sample_hz=second,
         actuation_hz=second,
         force_max_n=1.0,
@@ -76,9 +76,9 @@ def axis_of(
     _check(motion, time, estimator, gains)
     try:
         return idle_axis(
+            time,
             fastest + 1,
             clocks,
-            time.second,
             count_m=float(motion.count),
             travel_m=float(motion.travel),
             speed_max_m_per_s=time.to_axis(motion.speed_max, 1),
@@ -89,8 +89,7 @@ def axis_of(
             gains=None if gains is None else time.gains(gains),
         )
     except ValueError as error:
-        why = f"as if {time.second} samples were a second: {error}"
-        raise ValueError(f"{estimator} has no words for this motion ({why})") from None
+        raise ValueError(f"{estimator} has no words for this motion ({time.said}: {error})") from None
 
 
 def _check(motion: Motion, time: RecordTime, estimator: str, gains: EstimatorGains | None) -> None:

@@ -1,22 +1,26 @@
 """The time of a record: an axis for samples at any rate, whole or not.
 
-An `AxisSpec` has a whole number of samples a second. The axis of a record has a second of its own, a number of *sample
-periods*, so that the same hardware serves any rate. Lengths stay in the unit of the record. A quantity of the unit
-1/s^p is, in that second, (second / sample_hz)**p times what it is in a true one.
+An `AxisSpec` has a whole number of samples a second. The axis of a record has a second of its own, so that the same
+hardware serves any rate: a number of sample periods, the least power of two that is a true second or longer, and
+`SECOND` at least. Lengths stay in the unit of the record. A quantity of the unit 1/s^p is, in that second,
+(second / sample_hz)**p times what it is in a true one.
+
+The clock stamps of edges wrap after that second or more. So edges that are further apart read as standstill, as they do
+in hardware after a true second.
 """
 
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from .checks import FieldError, check_int, check_number, check_range
+from .arithmetic.fixed import bits_for
+from .checks import FieldError, check_number, check_range
 from .estimators.estimate import EstimatorGains
 from .requirements import RATES_HZ
 from .words import Word
 
 SECOND = 1 << 10
-"""The usual number of sample periods in the second of a record's axis."""
-SECOND_MAX = 1 << 40
+"""The fewest sample periods in the second of a record's axis."""
 RATES = 1e-6, float(RATES_HZ[1])
 """The least and the largest sample rate of a record, Hz."""
 OF_UNIT = re.compile(r"/s(?:\^\(?(\d+)(?:/(\d+))?\)?)?$")
@@ -43,21 +47,27 @@ class RecordTime:
 
     Attributes:
         sample_hz: the record's sample rate in true seconds, within `RATES`.
-        second: the sample periods in a second of the axis. The clock stamps of edges wrap after that second or more:
-            edges that are further apart read as standstill, as they do in hardware after a true second.
 
     Raises:
-        TypeError: if the rate is not a number, or `second` is no int.
-        ValueError: if one is out of range.
+        TypeError: if the rate is not a number.
+        ValueError: if it is not within `RATES`.
     """
 
     sample_hz: float
-    second: int = SECOND
 
     def __post_init__(self) -> None:
         check_number("sample_hz", self.sample_hz)
         check_range("sample_hz", self.sample_hz, *RATES)
-        check_int("second", self.second, 1, SECOND_MAX)
+
+    @property
+    def second(self) -> int:
+        """The sample periods in a second of the axis."""
+        return max(SECOND, 1 << bits_for(max(self.sample_hz, 1.0)))
+
+    @property
+    def said(self) -> str:
+        """What a message on the axis has to say of its second."""
+        return f"as if {self.second} samples were a second"
 
     def to_axis(self, value: float, power: float) -> float:
         """Return a quantity of unit 1/s^power in the axis's seconds."""

@@ -13,7 +13,7 @@ from .edge_times import clocks_of, samples_of, since_first
 from .encoder.level import level
 from .motion import Motion
 from .record_axis import DECODER_CLOCKS, axis_of
-from .record_time import SECOND, RecordTime
+from .record_time import RecordTime
 from .stamped import run
 from .velocity_estimator import VelocityEstimator, check_of_counts, is_floating, output_of
 
@@ -102,7 +102,7 @@ def velocity_of_edges(
 ) -> np.ndarray:
     """Return the velocity at a rate of its own, from an encoder's edges and their times, as the hardware estimates it.
 
-    Edges that are more than a second (or 1024 samples, if that is longer) apart read as standstill, as in hardware.
+    Edges that are more than a second apart, and more than 1024 samples, may read as standstill, as in hardware.
 
     Args:
         times_s: s, shape (edges,), increasing: the start of the record, and the time of every edge. Integers and
@@ -126,8 +126,7 @@ def velocity_of_edges(
     floating, output = is_floating(backend), output_of(estimator, output)
     array = checks.integers("counts", counts)
     since, unsure_s = since_first(times_s, array)
-    second = max(SECOND, 1 << int(np.ceil(np.log2(max(RecordTime(sample_hz).sample_hz, 1)))))
-    time = RecordTime(sample_hz, second)
+    time = RecordTime(sample_hz)
     clock_hz, gains = settings.pop("clock_hz", None), settings.pop("gains", None)
     if clock_hz is None:
         clock_hz = max(min(CLOCK_HZ, CLOCKS * sample_hz), 1 / np.diff(since).min())

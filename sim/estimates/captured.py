@@ -18,7 +18,6 @@ import scipy
 
 from ...model.encoder.level import level
 from ...model.record_axis import DECODER_CLOCKS
-from ...model.record_time import SECOND
 from ...model.spec import AxisSpec
 from ...model.stamped import Edges
 from ..loop.backends import number_of, opened
@@ -56,7 +55,7 @@ def with_clock(spec: AxisSpec, edges: EdgeRecord, rate_hz: float) -> AxisSpec:
     """
     wanted = max(min(edges.tick_hz, CLOCK_MAX_HZ), 1 / closest_s(edges)) / rate_hz
     clocks = 1 << max(int(np.ceil(np.log2(wanted))), 0)
-    return replace(spec, clock_hz=max(clocks, spec.clocks_per_sample) * SECOND)
+    return replace(spec, clock_hz=max(clocks, spec.clocks_per_sample) * spec.sample_hz)
 
 
 def position_counts(edges: EdgeRecord, rate_hz: float, samples: int) -> np.ndarray:

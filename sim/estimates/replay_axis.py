@@ -1,8 +1,7 @@
 """The axis for a recording, in units of its own, and the run of recorded counts through it on any backend.
 
-In its `AxisSpec` a metre is a *recorded count* and a second is `SECOND` *sample periods*, see
-`hardwall.model.record_time`, so the same hardware serves any recording. If the counts were divided by N, the axis'
-count is N recorded counts.
+In its `AxisSpec` a metre is a *recorded count*, and a second is one of `hardwall.model.record_time`. So the same
+hardware serves any recording. If the counts were divided by N, the axis' count is N recorded counts.
 
 Travel and speed of the axis follow from the recording (`hardwall.model.motion.ranges`), and the clocks of a sample from
 the fastest change (`hardwall.model.record_axis`).
@@ -20,13 +19,13 @@ from ...model.encoder.level import level
 from ...model.estimators import registry
 from ...model.motion import ranges
 from ...model.record_axis import idle_axis
-from ...model.record_time import SECOND
+from ...model.record_time import RecordTime
 from ...model.spec import AxisSpec
 from ..loop.backends import opened, whole
 from .through_pins import run_pins
 
 
-def axis_spec(counts: np.ndarray, count: int, acceleration_max: float, estimator: str) -> AxisSpec:
+def axis_spec(counts: np.ndarray, count: int, acceleration_max: float, estimator: str, time: RecordTime) -> AxisSpec:
     """Return the specification of the axis for a recording.
 
     Args:
@@ -34,14 +33,16 @@ def axis_spec(counts: np.ndarray, count: int, acceleration_max: float, estimator
         count: size of such a count, in recorded counts.
         acceleration_max: C, in recorded counts a sample^2.
         estimator: name of the velocity estimator.
+        time: the recording's sample rate.
     """
     travel, speed = ranges(counts)
     return idle_axis(
+        time,
         int(np.abs(np.diff(counts)).max()),
         count_m=float(count),
         travel_m=travel * count,
-        speed_max_m_per_s=speed * count * SECOND,
-        acceleration_max_m_per_s2=acceleration_max * SECOND**2,
+        speed_max_m_per_s=speed * count * time.second,
+        acceleration_max_m_per_s2=acceleration_max * time.second**2,
         estimator=estimator,
     )
 

@@ -15,7 +15,7 @@ from ...model.encoder.quadrature_speed import max_edge_rate
 from ...model.estimators import registry
 from ...model.motion import least_acceleration
 from ...model.record_axis import GLITCH_CLOCKS
-from ...model.record_time import SECOND
+from ...model.record_time import RecordTime
 from ...model.spec import AxisSpec
 from ..loop.backends import BACKENDS
 from ..recordings.recording import EdgeRecord, Recording
@@ -99,7 +99,7 @@ def _check_numbers(recording: Recording, coarsen: object, bound: float | None) -
     rate = recording.rate_hz
     if isinstance(coarsen, bool) or not (isinstance(coarsen, int) and 1 <= coarsen <= COARSEN_MAX):
         raise ArgumentError("coarsen", f"must be a whole number of 1 to {COARSEN_MAX}, not {shown(coarsen)}")
-    least, most = (number * (rate / SECOND) ** 2 for number in NUMBERS)
+    least, most = (RecordTime(rate).from_axis(number, 2) for number in NUMBERS)
     if bound is not None and not least <= bound <= most:
         said = f"must be {least:g} to {most:g} counts/s^2 at {rate:g} Hz, not {bound!r}"
         raise ArgumentError("acceleration_max_counts_per_s2", said)
@@ -159,6 +159,7 @@ def plan(
         ReplayError: in one line, what is refused and what is accepted.
     """
     rate, given = recording.rate_hz, acceleration_max_counts_per_s2
+    time = RecordTime(rate)
     cutoff = min(REFERENCE_HZ, rate / 4)
     _check_numbers(recording, coarsen, given)
     counts = _counts_for(recording, coarsen, estimator, backend)
@@ -169,13 +170,13 @@ def plan(
     if bound is None:
         bound = max(acceleration_bound(reference, rate), least_acceleration(counts) * coarsen * rate**2)
     try:
-        spec = axis_spec(counts, coarsen, bound / rate**2, estimator)
+        spec = axis_spec(counts, coarsen, bound / rate**2, estimator, time)
     except ValueError as error:
         raise _unfit(recording, estimator, bound, given is not None, error) from None
     try:
-        spec = applied(spec, settings, rate)
+        spec = applied(spec, settings, time)
     except ValueError as error:
-        raise ArgumentError("settings", f"must give an axis (as if {SECOND} samples were a second): {error}") from None
+        raise ArgumentError("settings", f"must give an axis ({time.said}): {error}") from None
     if whole is not None and needs_pins(estimator, backend):
         edges = coarse(whole, coarsen)
         spec = with_clock(spec, edges, rate)
@@ -184,7 +185,7 @@ def plan(
 
 def _unfit(recording: Recording, estimator: str, bound: float, given: bool, error: ValueError) -> ReplayError:
     """Return the error of a bound C from which no gains follow."""
-    why = f"as if {SECOND} samples were a second: {error}"
+    why = f"{RecordTime(recording.rate_hz).said}: {error}"
     if given:
         said = f"must give gains that fit this recording ({why}), not {bound!r}"
         return ArgumentError("acceleration_max_counts_per_s2", said)

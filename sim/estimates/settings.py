@@ -13,7 +13,7 @@ from typing import Any
 from ...model.checks import shown
 from ...model.estimators import registry
 from ...model.record_axis import DECODER_CLOCKS
-from ...model.record_time import SECOND, RecordTime
+from ...model.record_time import RecordTime
 from ...model.spec import AxisSpec
 
 
@@ -84,13 +84,13 @@ def in_counts(name: str) -> str:
     return re.sub(r"_m(?=_|$)", "_counts", name)
 
 
-def applied(spec: AxisSpec, settings: Settings, rate_hz: float) -> AxisSpec:
+def applied(spec: AxisSpec, settings: Settings, time: RecordTime) -> AxisSpec:
     """Return an axis with some settings.
 
     Raises:
         ValueError: if there is no such axis; the message names the field.
     """
-    changes, time = {}, RecordTime(rate_hz)
+    changes = {}
     if settings.jerk_max_counts_per_s3 is not None:
         changes["jerk_max_m_per_s3"] = time.to_axis(settings.jerk_max_counts_per_s3, 3)
     if settings.edge_error_max_counts is not None:
@@ -106,4 +106,4 @@ def applied(spec: AxisSpec, settings: Settings, rate_hz: float) -> AxisSpec:
     clocks = changed.clocks_per_sample
     while clocks < changed.design.latency_to_drive + DECODER_CLOCKS:
         clocks *= 2
-    return replace(changed, clock_hz=clocks * SECOND)
+    return replace(changed, clock_hz=clocks * changed.sample_hz)

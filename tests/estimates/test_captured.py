@@ -122,3 +122,18 @@ def test_a_capture_without_edges_is_at_rest():
     none = EdgeRecord(1e6, np.zeros(0, np.int64), np.zeros(0, np.int64), 0)
     found = replay(Recording("made.sr", "A,B", np.zeros(500, int), 1000.0, edges=none), "period")
     assert not found.velocity_counts_per_s.any()
+
+
+@pytest.mark.parametrize("rate_hz", [1e3, 1e4, 1e5])
+@pytest.mark.parametrize("estimator", ["period", "mt"])
+def test_slow_edges_are_a_motion_at_any_rate(estimator, rate_hz):
+    """Four edges a second, from the capture itself and from its counts: no edges for a second are a standstill."""
+    edges = EdgeRecord(TICK_HZ, (np.arange(1, 13) * TICK_HZ / 4).astype(np.int64), np.arange(1, 13), 0)
+    captured = recording(edges, rate_hz, 3.0)
+    counted = Recording("made.csv", "counts", captured.counts, rate_hz)
+    for made in (captured, counted):
+        seen = replay(made, estimator, acceleration_max_counts_per_s2=100.0)
+        judged = seen.velocity_counts_per_s[int(2 * rate_hz) :]
+        # Half an LSB, and two edges that are each a sample late at most.
+        lsb = seen.spec.design.estimator.velocity.lsb * rate_hz
+        assert np.abs(judged - 4.0).max() <= 0.5 * lsb + 4.0 * 2 * 4.0 / rate_hz
