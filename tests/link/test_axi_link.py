@@ -1,36 +1,23 @@
 """The board with a bus instead of a line: brought up by a bus master that others wrote, as the page on safety says."""
 
-import logging
-
 import cocotb
 import pytest
-from cocotb.clock import Clock
 from cocotb.triggers import ClockCycles
-from cocotbext.axi import AxiLiteBus, AxiLiteMaster
+from link.processor import make, started
 
-from hardwall.hdl.axis.board import Board
 from hardwall.hdl.axis.supervised import LOOPS
 from hardwall.hdl.link.axi_link import AxiLink
 from hardwall.model.axis.registers import RegisterMap
 from hardwall.model.axis.supervisor import ARMED, DISARMED, TRIPPED, names
-from hardwall.testing import Bench, parameters, simulate
+from hardwall.testing import parameters, simulate
 from stimuli.specs import spec
-
-
-def make(name: str) -> Board:
-    return Board(spec(name), AxiLink(RegisterMap(spec(name))))
 
 
 @cocotb.test()
 async def a_processor_brings_an_axis_up(dut):
     board = make(**parameters())
-    bench, registers, axis = Bench(dut, board), board.registers, board.spec
-    await bench.reset()
-    bench.drive(encoder_a_n=1, encoder_b_n=1, drive_enable=1, external_fault=1)
-    Clock(dut.oscillator, 20 * bench.period_ns, "ns").start()
-    master = AxiLiteMaster(AxiLiteBus.from_prefix(dut, "axi"), dut.clk)
-    for part in (master.write_if, master.read_if):
-        part.log.setLevel(logging.WARNING)
+    registers, axis = board.registers, board.spec
+    bench, master = await started(dut, board)
 
     async def write(name: str, word: int) -> int:
         place = registers[name].address

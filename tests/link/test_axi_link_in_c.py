@@ -1,24 +1,20 @@
 """The page's example in C arms an axis of RTL: every load and store of the compiled code is a transfer on the bus."""
 
 import ctypes
-import logging
 import re
 import subprocess
 from pathlib import Path
 
 import cocotb
 import pytest
-from cocotb.clock import Clock
 from cocotb.task import bridge, resume
 from cocotb.triggers import ClockCycles
-from cocotbext.axi import AxiLiteBus, AxiLiteMaster
+from link.processor import make, started
 
-from hardwall.hdl.axis.board import Board
-from hardwall.hdl.link.axi_link import AxiLink
 from hardwall.model import register_header
 from hardwall.model.axis.registers import RegisterMap
 from hardwall.model.axis.supervisor import ARMED, DISARMED, names
-from hardwall.testing import Bench, parameters, simulate
+from hardwall.testing import parameters, simulate
 from stimuli.specs import spec
 
 ROOT = Path(__file__).absolute().parents[2]
@@ -53,21 +49,11 @@ def compiled(folder: Path, hooked: bool) -> Path:
     return folder / "example.so"
 
 
-def make(name: str, library: str) -> Board:
-    """Return the board; the library is of the simulator's side alone."""
-    return Board(spec(name), AxiLink(RegisterMap(spec(name))))
-
-
 @cocotb.test()
 async def a_program_in_c_arms_an_axis_and_beats(dut):
-    board = make(**parameters())
-    bench, registers, axis = Bench(dut, board), board.registers, board.spec
-    await bench.reset()
-    bench.drive(encoder_a_n=1, encoder_b_n=1, drive_enable=1, external_fault=1)
-    Clock(dut.oscillator, 20 * bench.period_ns, "ns").start()
-    master = AxiLiteMaster(AxiLiteBus.from_prefix(dut, "axi"), dut.clk)
-    for part in (master.write_if, master.read_if):
-        part.log.setLevel(logging.WARNING)
+    board = make(parameters()["name"])
+    registers, axis = board.registers, board.spec
+    bench, master = await started(dut, board)
     answers = []
 
     @resume
@@ -121,7 +107,8 @@ async def a_program_in_c_arms_an_axis_and_beats(dut):
 
 @pytest.mark.parametrize("name", ["mhz"])
 def test_rtl(name, tmp_path):
-    simulate(__file__, make, name=name, library=str(compiled(tmp_path, hooked=True)))
+    # The library is of the simulator's side alone.
+    simulate(__file__, lambda name, library: make(name), name=name, library=str(compiled(tmp_path, hooked=True)))
 
 
 def test_with_a_pointer_the_example_stores_at_the_byte_offset(tmp_path):

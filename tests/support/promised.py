@@ -12,13 +12,12 @@ from importlib import import_module
 from pathlib import Path
 
 from hardwall import cli, testing
+from hardwall.cli.group import COMMANDS, loaded
 from hardwall.hdl.axis.axis import Axis
 from hardwall.hdl.axis.board import Board
 from hardwall.sim.scene import schema
 from hardwall.sim.scene.section import Section
 from stimuli.specs import spec
-
-from .pages import command_line
 
 FILE = Path(__file__).with_name("promised.txt")
 PYTHON = (
@@ -61,9 +60,9 @@ def of_hardware() -> Iterator[str]:
 
 def of_commands() -> Iterator[str]:
     """Yield the commands with their options, and the keys of their reports."""
-    for name, command in command_line().commands.items():
+    for name in COMMANDS:
         yield f"command {name}"
-        for option in command.params:
+        for option in loaded(name).params:
             yield from (f"command {name} {text}" for text in (*option.opts, *option.secondary_opts))
     reports = json.loads(Path(cli.__file__).with_name("reports.schema.json").read_text(encoding="utf-8"))["$defs"]
     for name, report in reports.items():
