@@ -231,6 +231,45 @@ async def a_capture_begins_with_the_count_that_passes_its_level(dut):
 
 
 @cocotb.test()
+async def a_capture_begins_with_the_force_of_the_wall(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+    contact, others = (sum(1 << SOURCES.index(name) for name in names) for names in (SOURCES[:1], SOURCES[1:]))
+    high, before = host.registers["wall_stiffness"].high, {"capture_before": 1, "capture_decimation": 1}
+    inside = {"wall_position": host.registers["wall_position"].low // 2}
+    for sources, states in ((contact, {TRIGGERED, DONE}), (others, {WAITING})):
+        await host.write(commit=1, wall_stiffness=0, **inside)
+        await host.write(capture_sources=sources, capture_level=host.registers["capture_level"].low, **before)
+        await host.write(capture_start=1)
+        while (await host.look(*SHOWN))["capture_state"] != WAITING:
+            pass
+        await host.write(commit=1, wall_stiffness=high, **inside)
+        await host.edges(host.settling)
+        assert (await host.look(*SHOWN))["capture_state"] in states
+
+
+async def actuations_until_answer(host: Host, pulse: str) -> int:
+    """Return the changed drives between a pulse of the link and the beginning of its answer."""
+    count, clock = 0, host.dut.clk
+    while not host.component.asked.unpack(int(host.dut.asking.value))[pulse]:
+        await RisingEdge(clock)
+    while int(host.dut.uart_tx.value):
+        count += host.shown()["actuated"]
+        await RisingEdge(clock)
+    return count
+
+
+@cocotb.test()
+async def an_answer_waits_for_the_drive_of_what_it_wrote(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+    for pulse in ("commit", "preload", "origin_shift"):
+        waited = cocotb.start_soon(actuations_until_answer(host, pulse))
+        await host.write(**{pulse: 1})
+        assert await waited >= 3
+
+
+@cocotb.test()
 async def what_trips_first_is_shown(dut):
     host = Host(dut, **parameters())
     await host.reset()
