@@ -35,7 +35,7 @@ LOADED = (
     *(import_module(f"hardwall.sim.pictures.{name}") for _, name, _ in pkgutil.iter_modules(pictures.__path__)),
 )
 """What is otherwise loaded when it is used: here once, and not in every child."""
-LIMIT_S = 60
+LIMIT_S = 300
 """The time after which a child counts as hung; it prints where, and ends. A loaded machine needs most of it."""
 SAMPLES_MAX = 50_000
 STEPS_MAX = 100
