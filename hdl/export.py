@@ -10,9 +10,8 @@ from pathlib import Path
 os.environ.setdefault("AMARANTH_USE_YOSYS", "builtin")
 
 from amaranth.back import verilog
-from amaranth.hdl import Fragment, Module, Signal, Value, _ir, _nir
+from amaranth.hdl import Fragment, Value, _ir, _nir
 from amaranth.lib import wiring
-from amaranth.lib.cdc import FFSynchronizer
 
 from hardwall.model import register_texts
 from hardwall.model.axes.axis import AxesSpec
@@ -21,6 +20,7 @@ from hardwall.model.runtime.build_folder import home_for_tools
 from hardwall.model.runtime.whole_file import whole_file
 from hardwall.model.spec import AxisSpec
 
+from .any_part import AnyPart
 from .axes.axis import Axes
 from .axes.board import AxesBoard
 from .axis.axis import Axis
@@ -29,35 +29,12 @@ from .axis.capture import NO_FIRST_CONTENTS
 from .link.axi_link import AxiLink
 from .ports import Described, port_table
 
-SYNCHRONISER = {"ASYNC_REG": "TRUE", "keep": "true"}
-"""Attributes of every stage of a synchroniser: place the stages side by side, and neither merge nor move them."""
 START = r"\$start "
 """The name of the signal whose only change, at the start of a simulation, lets every `always @*` run once."""
 _CONTENTS = re.compile(
     rf"^  \(\* {NO_FIRST_CONTENTS} = .* \*\)\n(  reg .*;\n)  initial begin\n(?:    .*\] = .*;\n)*  end\n", re.MULTILINE
 )
 _TRIGGER = re.compile(r"^  reg (\\\$auto\$verilog_backend\S+ ) = 0;$", re.MULTILINE)
-
-
-class _AnyPart:
-    """A platform of Amaranth without a part: its synchronisers have the attributes that tools of several parts read."""
-
-    def get_ff_sync(self, synchroniser: FFSynchronizer) -> Module:
-        """Return the hardware of a synchroniser, as Amaranth makes it but for the attributes."""
-        m = Module()
-        level = synchroniser.i
-        for number in range(synchroniser._stages):
-            stage = Signal(
-                level.shape(),
-                name=f"stage{number}",
-                init=synchroniser._init,
-                reset_less=synchroniser._reset_less,
-                attrs=SYNCHRONISER,
-            )
-            m.d[synchroniser._o_domain] += stage.eq(level)
-            level = stage
-        m.d.comb += synchroniser.o.eq(level)
-        return m
 
 
 def _with_start(text: str) -> str:
@@ -91,11 +68,15 @@ def to_verilog(component: wiring.Component, name: str) -> str:
 
     Source attributes are left out, so that the text depends only on the design and can be cached by its content. It is
     Verilog-2005, and means the same where it is read as SystemVerilog. A memory with the attribute `NO_FIRST_CONTENTS`
-    has no first contents.
+    has no first contents. What the components add by `platform.add_file` comes behind it.
+
+    Raises:
+        ValueError: if two added files have one name, or one has a module called `name`.
     """
+    part = AnyPart()
     with _home_for_yosys():
-        text = verilog.convert(component, name=name, platform=_AnyPart(), emit_src=False, strip_internal_attrs=True)
-    return _with_start(_CONTENTS.sub(r"\1", text))
+        text = verilog.convert(component, name=name, platform=part, emit_src=False, strip_internal_attrs=True)
+    return part.added_to(_with_start(_CONTENTS.sub(r"\1", text)), name)
 
 
 def to_netlist(component: wiring.Component, name: str) -> _nir.Netlist:
@@ -110,7 +91,7 @@ def to_netlist(component: wiring.Component, name: str) -> _nir.Netlist:
         )
         for path, member, value in component.signature.flatten(component)
     }
-    return _ir.build_netlist(Fragment.get(component, _AnyPart()), ports, name=name)
+    return _ir.build_netlist(Fragment.get(component, AnyPart()), ports, name=name)
 
 
 def _facts(spec: AxisSpec | AxesSpec) -> list[str]:

