@@ -3,7 +3,7 @@
 import re
 
 import reports
-import views
+from views.tables import number
 
 from hardwall.sim.pictures.rates import draw_beside_errors
 from hardwall.sim.pictures.style import save
@@ -27,7 +27,7 @@ def filled(text: str) -> str:
 
     def row(match: re.Match) -> str:
         name, output, what = match.groups()
-        errors = " | ".join(views.number(found[name, output, rate]) for rate in RATES)
+        errors = " | ".join(number(found[name, output, rate]) for rate in RATES)
         return f"| `{name}` {output} |{what}| {errors} |"
 
     return ROW.sub(row, text)

@@ -10,6 +10,12 @@ from support.prose import faults, numbers, sentences, words
 GUIDES = [name for name in PAGES if name.startswith("docs/guide/")]
 WORDS, LONGEST, AVERAGE, NUMBERS = 1500, 25, 18, 2
 """The most words a guide, words a sentence, words a sentence on average, and numbers a sentence."""
+TEMPLATES = [name for name in PAGES if name.startswith("docs/results/") and "%report" in text_of(name)]
+TYPED = "docs/results/estimators.md", "docs/results/walls.md"
+"""Pages of results that have one table of a report, and others that were typed."""
+TEMPLATE_WORDS = 800
+MEASURED = re.compile(r"\d\s*(?:%|(?:[mkµnM]?(?:m|N|s|m/s|N/m|N s/m|LUT4))(?![\w/]))")
+"""A number with a unit that results have. Frequencies are those of commands."""
 
 
 def test_there_are_guides():
@@ -28,7 +34,18 @@ def test_a_guide_shows_a_picture(name):
     assert [path for path in shown if not (ROOT / name).parent.joinpath(path).exists()] == []
 
 
-@pytest.mark.parametrize("name", GUIDES)
+@pytest.mark.parametrize("name", [name for name in TEMPLATES if name not in TYPED])
+def test_results_have_no_number_that_was_typed(name):
+    assert len(text_of(name).split()) <= TEMPLATE_WORDS
+    assert [each for each in sentences(text_of(name)) if MEASURED.search(each)] == []
+
+
+def test_a_measured_number_is_found():
+    shown = ["3.5 mm", "4 kN/m", "12 %", "7 N s/m of 20", "0.3 ms"]
+    assert [each for each in (*shown, "at 10 kHz", "K to 3 Hz", "2 starts", "5 more") if MEASURED.search(each)] == shown
+
+
+@pytest.mark.parametrize("name", [*GUIDES, *(name for name in TEMPLATES if name not in TYPED)])
 def test_a_sentence_is_read_once(name):
     every = sentences(text_of(name))
     assert len(every) > 10

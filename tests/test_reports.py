@@ -15,6 +15,7 @@ sys.path.insert(0, str(ROOT / "docs"))
 import for_readme
 import reports
 import views
+from views.tables import number
 
 WANTED = reports.wanted()
 KEPT = {name: found for name in WANTED if (found := reports.kept(name))}
@@ -94,7 +95,7 @@ def test_a_report_is_kept_with_where_it_comes_from(monkeypatch, tmp_path):
 
 
 def test_numbers_have_as_many_digits_as_matter():
-    assert [views.number(value) for value in (131.38, 0.0851, 4.1312, 12345.6)] == ["131", "0.0851", "4.13", "12300"]
+    assert [number(value) for value in (131.38, 0.0851, 4.1312, 12345.6)] == ["131", "0.0851", "4.13", "12300"]
 
 
 def test_a_page_shows_a_report_where_it_comes_from_and_that_it_is_stale(monkeypatch):

@@ -15,7 +15,7 @@ from support.pages import PAGES, ROOT
 SITE = ROOT / "build/docs"
 SHOWN = "index", "guide/start", "guide/motor", "results/estimators", "reference/scenes"
 """The pages of which pictures are kept."""
-TYPED = "results/estimators", "results/rendered", "results/trade", "results/walls"
+TYPED = "results/estimators", "results/trade", "results/walls"
 """Pages with tables that were typed, some of which are wider; those that come from reports are not."""
 SCREEN, PHONE = 1280, 390
 """Widths in pixels."""

@@ -84,7 +84,7 @@ PICTURES = {
     "rates beside errors": lambda: rates.draw_beside_errors(errors_at_rates(), results.rate_gains().report()),
     **{
         f"rendered, {name}": lambda name=name: rendered.draw(results.rendered_walls())[name]
-        for name in ("impedance", "contact")
+        for name in ("impedance", "bandwidth", "contact")
     },
     "zwidth": lambda: zwidth.draw(results.maps()),
     "zwidth of many": every_estimator_mapped,
