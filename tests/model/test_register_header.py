@@ -9,12 +9,14 @@ from hardwall.model.axes.registers import AxesMap
 from hardwall.model.axis import supervisor
 from hardwall.model.axis.register_file import CELL_BITS, Design
 from hardwall.model.axis.registers import CAPTURE, MAP, RegisterMap
+from hardwall.model.estimators.registry import ESTIMATORS
 from hardwall.model.link.axi import Response, Subordinate
 from hardwall.model.register import Kind
 from hardwall.model.register_texts import c_header
-from stimuli.specs import spec
+from stimuli.specs import SPECS, spec
 from stimuli.supervised import supervised
 from stimuli.supervised_axes_world import slow
+from support.pages import text_of
 
 REGISTERS = supervised("mhz")
 HEADER = register_header.header(REGISTERS)
@@ -67,6 +69,39 @@ def test_a_load_and_a_store_at_the_offset_reach_the_register_on_the_bus(register
         assert bus.file.live[register.address : register.address + 2] == list(register.to_registers(register.high))
     else:
         assert bus.write(offset, 0, lanes) == Response.DECERR
+
+
+RULE = re.compile(r"^\| (a [^|]*?) \| 2 · address(?: ([+-]) (\d))? \| (\d+) \|$", re.M)
+RULES = {
+    row: (int(f"{sign}{more or 0}"), int(bits))
+    for row, sign, more, bits in RULE.findall(text_of("docs/reference/link.md"))
+}
+"""What the page says of a kind of register: the bytes beside twice its address, and the bits of a load or store."""
+ROWS = (
+    "a value of 32 bits",
+    "a pulse or a counter at an even address",
+    "a pulse or a counter at an odd address",
+)
+
+
+@pytest.mark.parametrize("name", SPECS)
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_the_rule_on_the_page_is_the_offset_of_every_register(name, estimator):
+    assert set(RULES) == set(ROWS)
+    registers, seen = supervised(name, estimator).registers, set()
+    for register in registers:
+        row = ROWS[0 if register.kind.wide else 1 + register.address % 2]
+        more, bits = RULES[row]
+        assert (2 * register.address + more, bits) == (register_header.offset_of(register), 16 * register.size)
+        seen.add(row)
+    assert seen == set(ROWS)
+
+
+def test_a_store_at_twice_the_address_of_disarm_arms_as_the_page_warns():
+    bus, place = Subordinate(Design(REGISTERS)), 2 * REGISTERS["disarm"].address
+    assert place != NUMBERS["DISARM_OFFSET"]
+    assert bus.write(place, 1 << 8 * (place % 4), 0b11 << place % 4) == Response.OKAY
+    assert bus.pulses == ("arm",)
 
 
 def test_every_bit_has_the_shift_of_its_mask():
