@@ -224,19 +224,22 @@ INTERPRETER := $(if $(STALE),$(PYTHON),$(VENV)/bin/python)
 
 $(VENV)/.made: $(if $(STALE),FORCE) | tools
 	@"$(PYTHON)" -m venv $(if $(MADE_IN),--clear) $(VENV)
-	@$(PIP) install --quiet --require-hashes --requirement <(sed -n '/^uv==/,/[^\]$$/p' $(LOCK)) 2>$(VENV)/uv.log || true
+	@$(PIP) install --quiet --require-hashes --requirement <(sed -n '/^uv==/,/[^\]$$/p' $(LOCK)) 2>$(VENV)/uv.log || \
+	  if grep -q 'DO NOT MATCH THE HASHES' $(VENV)/uv.log; then cat $(VENV)/uv.log >&2; exit 1; fi
 	@printf '%s\n' "$(PYTHON)" >$(VENV)/.python
 	@printf '%s\n' "$(CURDIR)" >$@
 
 # Every version is that of $(LOCK), whose hashes uv checks. Where uv is not to be had, or finds no package, pip takes its
-# place: it checks no hash, for it cannot where a tree is installed in place. Only one installer runs at a time, even in a
-# parallel make; of its output, only the large packages and the end are shown. Yosys and the placers compile themselves
-# when they run first, into a file of the user's which all runs read: two first runs at a time would break each other, so
-# they have theirs here.
+# place: it checks no hash, for it cannot where a tree is installed in place. Any other failure of uv ends the task: a
+# file with another hash must not come in by pip. Only one installer runs at a time, even in a parallel make; of its
+# output, only the large packages and the end are shown. Yosys and the placers compile themselves when they run first,
+# into a file of the user's which all runs read: two first runs at a time would break each other, so they have theirs here.
 LOCK := requirements.lock
 UNHASHED := sed '/--hash/d; s/ *\\$$//' $(LOCK) >$(VENV)/constraints.txt
 PIP := $(RUN) pip --disable-pip-version-check
 UV := $(VENV)/bin/uv
+# How uv begins when an index cannot be reached, or has no such package.
+FOUND_NONE := ^error: (No solution found|Failed to fetch:)
 SAYS := s/^Downloading \(.*\)/  \1/p; s/^Collecting \([^ ]*\).*/  \1/p; s/^Installed/  installed/p; \
   s/^Installing collected packages.*/  unpacking all of these/p
 define install
@@ -245,7 +248,11 @@ define install
     --build-constraint $(LOCK) --editable '.[$(1)]' 2>&1 | tee $(VENV)/uv.log | sed -un '$(SAYS)'; }; \
   by_pip() { $(UNHASHED); PIP_CONSTRAINT=$(VENV)/constraints.txt $(PIP) install --progress-bar off \
     --editable '.[$(1)]' | sed -un '$(SAYS)'; }; \
-  if by_uv; then rm $(VENV)/uv.log; else tail -n 1 $(VENV)/uv.log 2>/dev/null || true; echo "  by pip, without uv:"; by_pip; fi; \
+  if by_uv; then rm $(VENV)/uv.log; \
+  elif [ ! -x $(UV) ] || grep -Eq '$(FOUND_NONE)' $(VENV)/uv.log; then \
+    tail -n 1 $(VENV)/uv.log 2>/dev/null || true; echo "  by pip, without uv:"; by_pip; \
+  else cat $(VENV)/uv.log >&2; \
+    echo "hardwall: uv failed (see above), and pip does not take its place, for it checks no hash" >&2; exit 1; fi; \
   $(foreach tool,$(3),$(VENV)/bin/yowasp-$(tool) --version >/dev/null 2>&1;) \
   echo "  done in $$((SECONDS - began)) s"
 @touch $@
