@@ -76,14 +76,18 @@ def _with_start(text: str) -> str:
 
 @contextmanager
 def _home_for_yosys() -> Iterator[None]:
-    """Give Yosys, which runs in a process of its own, a home where the user has none."""
+    """Give Yosys, which runs in a process of its own, a home where the user has none that it can use."""
     given = home_for_tools()
+    before = {name: os.environ.get(name) for name in given}
     os.environ.update(given)
     try:
         yield
     finally:
-        for name in given:
-            del os.environ[name]
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def to_verilog(component: wiring.Component, name: str) -> str:

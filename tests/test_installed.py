@@ -106,8 +106,10 @@ def test_the_extra_sim_hits_and_replays(place, tmp_path):
     with place("sim") as environment:
         forces = report(environment.run(*HIT, "--backend", "float"))["max_force_n"]
         assert forces == pytest.approx(12.56, abs=0.01)
-        keeping = {"HARDWALL_BUILD": environment.work / "mäde"}
-        fixed = environment.run(*HIT, HOME="/nonexistent", **keeping)
+        # A home that is not there, and that what runs here cannot make.
+        home = environment.folder / "home"
+        keeping = {"HARDWALL_BUILD": environment.work / "mäde", "HOME": home}
+        fixed = environment.run(*HIT, **keeping)
         rtl = (*HIT, "--backend", "rtl")
         done = environment.run(*rtl, path=without_a_compiler(environment), **keeping)
         assert (done.returncode, done.stdout) == (1, "")
@@ -116,6 +118,9 @@ def test_the_extra_sim_hits_and_replays(place, tmp_path):
         )
         built = environment.run(*rtl, path=os.environ["PATH"], **keeping)
         assert report(built)["force_sha256"] == report(fixed)["force_sha256"]
+        written = environment.run("hardwall", "verilog", "--board", "icebreaker", "-o", "files", **keeping)
+        assert (written.returncode, written.stderr) == (0, "")
+        assert not home.exists()
         assert environment.run("python", "-c", page("docs/guide/start.md").text).returncode == 0
         replay = "hardwall", "replay", "recording.csv", "--column", "counts", "--plot", "replay.png", "--json"
         assert report(environment.run(*replay, **keeping))["samples"] == 2000

