@@ -25,6 +25,14 @@ class RequirementError(ImportError):
     """A package is absent, or its version is outside the range: one line that says what is needed."""
 
 
+def version_of_project() -> str | None:
+    """Return the version of this project; None without metadata."""
+    try:
+        return version(PROJECT)
+    except PackageNotFoundError:
+        return None
+
+
 def absent(package: str, extra: str | None) -> str:
     """Return the message for a package that is not installed.
 

@@ -86,6 +86,12 @@ def test_an_import_that_fails_is_told_by_the_module():
     assert extras.lacking(extras.RequirementError("a line")) == "a line"
 
 
+def test_the_project_has_the_version_of_its_metadata(installed):
+    assert extras.version_of_project() is None
+    installed["hardwall"] = "0.2.0"
+    assert extras.version_of_project() == "0.2.0"
+
+
 def test_without_metadata_nothing_is_checked(monkeypatch):
     def requires(name: str) -> list[str]:
         raise PackageNotFoundError(name)
