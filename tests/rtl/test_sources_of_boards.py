@@ -85,7 +85,7 @@ def test_an_unknown_board_and_too_many_axes_are_one_line(quick, tmp_path, monkey
     code, _, err = call(monkeypatch, capsys, "verilog", "--board", "nix", "-o", str(tmp_path))
     assert (code, err) == (2, f"hardwall: error: --board must be one of {', '.join(BOARDS)}, not 'nix'\n")
     axes = AxesSpec(axes=2, **load("mhz").requirements)
-    with pytest.raises(FieldError, match=r"^axes must be absent: icebreaker has pins for one axis, not 2$"):
+    with pytest.raises(FieldError, match=r"^axes must be absent on icebreaker \(its pins are those of a single axis\), not 2$"):
         files_around(axes, BOARDS["icebreaker"])
     assert "alive_1" in files_around(axes, BOARDS["ulx3s-25f"])["top.v"]
 
