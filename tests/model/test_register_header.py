@@ -112,6 +112,14 @@ def test_every_bit_has_the_shift_of_its_mask():
     assert NUMBERS["LATCHED_MASK"] == supervisor.ALL
 
 
+def test_a_mask_of_a_register_has_all_bits_that_it_can_have():
+    masks = {name.removesuffix("_MASK"): value for name, value in NUMBERS.items() if name.endswith("_MASK")}
+    whole = {name: mask for name, mask in masks.items() if not name.startswith("COUNTS_")}
+    bits = {"STATE": 2, "FLAGS": len(REGISTERS.spec.design.flags), "CAPTURE_STATE": 3}
+    bits |= dict.fromkeys(("LATCHED", "FIRST"), len(supervisor.names(supervisor.ALL)))
+    assert whole == {name: (1 << width) - 1 for name, width in bits.items()}
+
+
 def test_the_fields_of_the_counts_are_a_number_of_each_cause():
     """The words are as the supervisor has them: four bits a cause, the first one lowest, eight to a word."""
     fields = re.findall(r"^#define HARDWALL_COUNTS_(\d)_(\w+)_MASK (0x[0-9A-F]+)$", HEADER, re.M)
@@ -124,8 +132,9 @@ def test_the_fields_of_the_counts_are_a_number_of_each_cause():
     }
 
 
-def test_a_record_is_found_in_the_window():
-    """Its register 6 has an even address, and so is the upper half of its word."""
+def test_the_windows_and_a_record_are_found():
+    """A window begins at twice its address. Register 6 of a record is the upper half of a word: its address is even."""
+    assert NUMBERS["MAP_OFFSET"] == 0x8000
     assert (NUMBERS["CAPTURE_OFFSET"], NUMBERS["RECORD_BYTES"], NUMBERS["RECORD_FLAGS_OFFSET"]) == (0x10000, 16, 14)
 
 

@@ -100,7 +100,12 @@ def test_without_metadata_nothing_is_checked(monkeypatch):
     extras.need("host")
 
 
-ROOMS = {"hdl": "amaranth", "host": "pymodbus", "host.panel": "nicegui", "sim.scene": "dask", "testing": "cocotb"}
+OF_SIM = ("estimates", "loop", "scene", "studies", "virtual", "walls", "world")
+ROOMS = {
+    **{"hdl": "amaranth", "host": "pymodbus", "host.panel": "nicegui", "sim.rtl": "pylibfst", "testing": "cocotb"},
+    **{f"sim.{room}": "dask" for room in OF_SIM},
+}
+"""The rooms that need packages, each with one of them."""
 PROGRAM = """
 import importlib.metadata as metadata
 version = metadata.version
