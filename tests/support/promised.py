@@ -24,6 +24,7 @@ PYTHON = (
     *(("model", name) for name in ("Motion", "Sampler", "VelocityEstimator")),
     *(("model", name) for name in ("velocity", "velocity_of_edges")),
     *(("model.axis", "Axis"), ("model.axis", "step"), ("model.spec", "AxisSpec"), ("model.stamped", "run")),
+    ("sim.scene", "spec"),
 )
 
 
