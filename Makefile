@@ -78,10 +78,10 @@ test: $(VENV)/.test | tools ## every regression: the model against exact arithme
 
 prove faults gate coverage mutate: export HARDWALL_AGAIN := $(AGAIN)
 
-prove: $(VENV)/.test | tools ## every promise about safety and every width, proven; every proof is seen to fail with a bug
+prove: $(VENV)/.test | tools ## proofs of every promise about safety and of every width; each proof fails with a bug
 	@$(IN_TESTS) signoff.prove $(ONLY)
 
-faults: $(VENV)/.test | tools ## faults injected into the board and its plant: what trips, how soon, and the force meanwhile
+faults: $(VENV)/.test | tools ## faults injected into the board and its plant: what trips, how soon, and the force
 	@$(IN_TESTS) signoff.faults $(ONLY)
 
 gate: $(VENV)/.test | tools ## netlists of three families of FPGAs beside the RTL, from power-up on: all outputs, every clock
@@ -113,7 +113,7 @@ choose: $(VENV)/.synth | tools ## the table to choose an estimator by: accuracy,
 	@$(HARDWALL) costs
 	@$(HARDWALL) choose
 
-figures: $(VENV)/.synth | tools ## the founding paper's figures and every study of ours, as pictures in build/ (an hour and more)
+figures: $(VENV)/.synth | tools ## the founding paper's figures and every study, as pictures in build/ (an hour and more)
 	@for number in 1 2; do $(HARDWALL) accuracy --figure $$number --plot build/figure-$$number.png; done
 	@$(HARDWALL) lipschitz --plot build/figure-4.png
 	@for scene in $(MAPPED); do $(HARDWALL) zwidth $$scene --resume --plot build/$$scene.png; done
@@ -126,7 +126,7 @@ figures: $(VENV)/.synth | tools ## the founding paper's figures and every study 
 panel: $(VENV)/.panel | tools ## feel a wall: a board in simulation, behind a page in the browser
 	@$(HARDWALL) panel virtual
 
-browser: $(VENV)/.test docs | tools ## the panel's page in a real browser, beside a board in simulation; and the pages (some minutes, alone on the machine)
+browser: $(VENV)/.test docs | tools ## the panel's page and these pages in a real browser (some minutes, alone on the machine)
 	@HARDWALL_BROWSER=1 $(RUN) pytest -n 0 tests/host/panel/test_page.py tests/test_site.py $(ARGS)
 
 screenshots: $(VENV)/.test | tools ## the pictures of the panel's page, anew, by a browser
@@ -142,7 +142,7 @@ docs: $(VENV)/.docs | tools ## the pages as a site in build/docs, every link ins
 diagrams: $(VENV)/.docs | tools ## draw the diagrams of the pages anew, from the code that they show
 	@$(RUN) docs.diagrams.draw
 
-results: $(VENV)/.docs | tools ## the reports of pages and README: those whose sources have changed, or ONLY="NAMES" (half an hour)
+results: $(VENV)/.docs | tools ## the reports of pages and README whose sources have changed, or ONLY="NAMES" (half an hour)
 	@PYTHONPATH=tests $(VENV)/bin/python docs/reports.py $(if $(LIST),--list) $(ONLY)
 	@PYTHONPATH=tests $(VENV)/bin/python docs/for_readme.py
 
@@ -151,7 +151,7 @@ digests: $(VENV)/.test | tools ## record anew what the program computes, and sho
 
 soak fuzz: PYTEST += -o faulthandler_timeout=0
 
-soak: $(VENV)/.test | tools ## 10^9 samples of every estimator, every digest, every loop whole, RTL and model with new seeds
+soak: $(VENV)/.test | tools ## the long campaigns, with new seeds: 10^9 samples of every estimator, every loop whole
 	@echo "HARDWALL_ENDURANCE=$(ENDURANCE)"
 	@HARDWALL_ENDURANCE=$(ENDURANCE) $(PYTEST) tests/test_endurance.py
 	@HARDWALL_DIGESTS=all HARDWALL_LOOPS=all $(PYTEST)
@@ -160,7 +160,7 @@ soak: $(VENV)/.test | tools ## 10^9 samples of every estimator, every digest, ev
 	  HARDWALL_SEED=$$seed HARDWALL_SAMPLES=$(SAMPLES) $(PYTEST) -m rtl $(ARGS); \
 	done
 
-fuzz: $(VENV)/.test | tools ## 20 000 hostile calls of the command line, and 200 runs ended at random times (an hour or two)
+fuzz: $(VENV)/.test | tools ## 20 000 hostile calls of the command line, and 200 killed runs (hours)
 	@HARDWALL_FUZZ=$(CALLS) HARDWALL_KILLS=$(KILLS) $(PYTEST) tests/test_fuzz.py tests/test_killed.py $(ARGS)
 
 matrix: $(VENV)/.test | tools ## the wheel with each extra, installed elsewhere: oldest and newest packages, every Python (half an hour)

@@ -12,6 +12,8 @@ import pytest
 ROOT = Path(__file__).absolute().parent.parent
 MAKE = shutil.which("make")
 NEEDED = ["Makefile", "pyproject.toml", "requirements.lock"]
+MOST_WORDS = 16
+"""The most words that the help has for a task."""
 PACKAGES = {"python3": "python3", "c++": "g++", "perl": "perl"}
 
 
@@ -43,6 +45,7 @@ def test_help_lists_every_task(tree):
     done = make(tree, "help")
     assert [line.split()[1] for line in done.stdout.splitlines()] == [t for t in tasks if t not in ("tools", "FORCE")]
     assert done.stderr == ""
+    assert [line for line in done.stdout.splitlines() if len(line.split()) > 2 + MOST_WORDS] == []
 
 
 def test_what_runs_from_the_tests_folder_has_the_tests_tools():

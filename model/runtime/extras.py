@@ -40,8 +40,8 @@ def absent(package: str, extra: str | None) -> str:
     """
     of_extra = f"[{extra}]" if extra else ""
     return (
-        f"{package} is not installed: it comes with pip install '.{of_extra}' in the checkout of hardwall, "
-        f"or with pip install 'WHEEL{of_extra}' of its wheel"
+        f"{package} is not installed: it comes with pip install '.{of_extra}' in the checkout of hardwall. "
+        f"With the wheel: pip install 'WHEEL{of_extra}'"
     )
 
 

@@ -39,8 +39,8 @@ main()
 def comes_with(extra: str) -> str:
     """Return what brings an extra: hardwall is on no package index."""
     return (
-        f"it comes with pip install '.[{extra}]' in the checkout of hardwall, "
-        f"or with pip install 'WHEEL[{extra}]' of its wheel"
+        f"it comes with pip install '.[{extra}]' in the checkout of hardwall. "
+        f"With the wheel: pip install 'WHEEL[{extra}]'"
     )
 
 

@@ -50,8 +50,8 @@ def test_what_is_absent_is_named_with_its_extra(installed, extra):
     with pytest.raises(extras.RequirementError) as caught:
         extras.need(extra)
     assert str(caught.value) == (
-        f"{package} is not installed: it comes with pip install '.{of_extra}' in the checkout of hardwall, "
-        f"or with pip install 'WHEEL{of_extra}' of its wheel"
+        f"{package} is not installed: it comes with pip install '.{of_extra}' in the checkout of hardwall. "
+        f"With the wheel: pip install 'WHEEL{of_extra}'"
     )
 
 

@@ -1,7 +1,7 @@
 """The package as others get it: built from a copy of the tree, and installed outside of it.
 
-The environments are hostile. Their site-packages cannot be written. There is no home folder, their path has a letter
-beyond ASCII, and where the tests run as root, another user runs what is in them.
+The environments are hostile. Their site-packages cannot be written. There is no home folder. Their path has a letter
+beyond ASCII. Where root runs the tests, another user runs the environments.
 """
 
 import importlib.metadata
@@ -35,9 +35,9 @@ class Source:
     """Where the packages of an environment come from.
 
     Attributes:
-        interpreter: the Python; None for one of the running version that a stranger can start, if there is one.
-        resolution: `OLDEST` or `NEWEST`, for packages that are installed; None for the packages of the running
-            environment, of which the files are linked: quick, and without an index.
+        interpreter: the Python; None for one of the running version. A stranger can start it, if there is such a one.
+        resolution: `OLDEST` or `NEWEST` packages of the index; None for those of the running environment. Their files
+            are linked, which is quick and needs no index.
     """
 
     interpreter: str | None = None
@@ -70,7 +70,7 @@ class Environment:
         return next((self.folder / "lib").glob("python3.*/site-packages"))
 
     def run(self, *command: object, path: object = "", **environ: object) -> subprocess.CompletedProcess:
-        """Run a command of the environment with nothing in its own environment but what is given.
+        """Run a command of the environment. It sees the variables that are given, and no others.
 
         Args:
             command: its words, with the name of a program of the environment as the first one.
