@@ -304,8 +304,8 @@ tools: export CHECK = $(CHECK_PYTHON)
 tools:
 	@missing=0; \
 	needs() { echo "hardwall needs $$1: install the Debian or Ubuntu package $$2" >&2; missing=1; }; \
-	if [[ $$PWD =~ [[:space:]] ]]; then \
-	  echo "hardwall needs a path without spaces, for Verilator's makefiles" >&2; missing=1; fi; \
+	if [[ $$PWD == *[[:space:]\$$:#%]* ]]; then \
+	  echo 'hardwall needs a path without spaces and without $$ : # %, for Verilator and make' >&2; missing=1; fi; \
 	if ! command -v "$(INTERPRETER)" >/dev/null; then needs "Python 3.11 or newer, and there is no $(INTERPRETER)" python3; \
 	elif ! fault=$$("$(INTERPRETER)" -c "$$CHECK" 2>&1); then needs "$${fault%|*}" "$${fault##*|}"; fi; \
 	command -v c++ >/dev/null || needs "a C++ compiler, c++" g++; \

@@ -69,8 +69,9 @@ def test_what_is_missing_is_named_with_its_package(tree, tmp_path, lacks, tasks)
     assert sorted(path.name for path in tree.iterdir()) == NEEDED
 
 
-def test_a_path_with_a_space_is_refused(tree):
-    spaced = tree.rename(tree.with_name("a tree"))
+@pytest.mark.parametrize("letter", [" ", "$", ":", "#", "%"])
+def test_a_path_that_make_cannot_read_is_refused(tree, letter):
+    spaced = tree.rename(tree.with_name(f"a{letter}tree"))
     done = make(spaced, "test")
     assert done.stderr.startswith("hardwall needs a path without spaces")
     assert done.returncode == 2

@@ -21,22 +21,25 @@ MODULES_OF_PERL = "-MFindBin", "-MPod::Usage"
 """The modules that Verilator's own script loads: Debian's perl-base is a `perl` without them."""
 
 
+READ_BY_TOOLS = frozenset("$:#%;&|<>()[]{}*?!~^`'\"\\")
+"""What make, the shell or ccache reads in a path as something else than a letter; so they do every kind of space."""
+
+
 class BuildError(RuntimeError):
     """Verilator or the C++ compiler failed, or cannot work; one line that names the log or the cause."""
 
 
 def check_paths(build: Path) -> None:
-    """Check that hardware can be built: the system's tools are on the path, and make can work with every path.
+    """Check that hardware can be built: the system's tools are on the path, and make can work in every folder.
 
     Raises:
         BuildError: if it cannot.
     """
     tools = {"Verilator": Path(verilator.__file__), "Python": Path(sys.executable)}
     for name, path in {"the build folder ($HARDWALL_BUILD)": build, **tools}.items():
-        if len(str(path).split()) != 1:
-            raise BuildError(
-                f"the path of {name} must be without a space for make to build there, not {shown_path(path)}"
-            )
+        found = next((each for each in str(path) if each.isspace() or each in READ_BY_TOOLS), None)
+        if found is not None:
+            raise BuildError(f"the path of {name} must be without {found!r} for make, not {shown_path(path)}")
     absent = {package: tool for tool, package in NEEDED.items() if shutil.which(tool) is None}
     if "perl" not in absent and children.run(["perl", *MODULES_OF_PERL, "-e", "1"], capture_output=True).returncode:
         absent["perl"] = "perl with its modules"

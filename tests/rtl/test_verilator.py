@@ -20,6 +20,11 @@ def tools(tmp_path, monkeypatch) -> Path:
     return folder
 
 
+@pytest.mark.parametrize("name", ["made", "mäde", "a-b_c.d", "a+b", "a=b", "a,b@c"])
+def test_a_folder_of_any_other_name_is_built_in(tmp_path, tools, name):
+    check_paths(tmp_path / name)
+
+
 @pytest.mark.parametrize(
     ("absent", "message"),
     [
