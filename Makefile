@@ -78,10 +78,10 @@ test: $(VENV)/.test | tools ## every regression: the model against exact arithme
 
 prove faults gate coverage mutate: export HARDWALL_AGAIN := $(AGAIN)
 
-prove: $(VENV)/.test | tools ## every promise about safety and every width, proven; every proof is seen to fail with a bug
+prove: $(VENV)/.test | tools ## proofs of every promise about safety and of every width; each proof fails with a bug
 	@$(IN_TESTS) signoff.prove $(ONLY)
 
-faults: $(VENV)/.test | tools ## faults injected into the board and its plant: what trips, how soon, and the force meanwhile
+faults: $(VENV)/.test | tools ## faults injected into the board and its plant: what trips, how soon, and the force
 	@$(IN_TESTS) signoff.faults $(ONLY)
 
 gate: $(VENV)/.test | tools ## netlists of three families of FPGAs beside the RTL, from power-up on: all outputs, every clock
@@ -113,7 +113,7 @@ choose: $(VENV)/.synth | tools ## the table to choose an estimator by: accuracy,
 	@$(HARDWALL) costs
 	@$(HARDWALL) choose
 
-figures: $(VENV)/.synth | tools ## the founding paper's figures and every study of ours, as pictures in build/ (an hour and more)
+figures: $(VENV)/.synth | tools ## the founding paper's figures and every study, as pictures in build/ (an hour and more)
 	@for number in 1 2; do $(HARDWALL) accuracy --figure $$number --plot build/figure-$$number.png; done
 	@$(HARDWALL) lipschitz --plot build/figure-4.png
 	@for scene in $(MAPPED); do $(HARDWALL) zwidth $$scene --resume --plot build/$$scene.png; done
@@ -126,7 +126,7 @@ figures: $(VENV)/.synth | tools ## the founding paper's figures and every study 
 panel: $(VENV)/.panel | tools ## feel a wall: a board in simulation, behind a page in the browser
 	@$(HARDWALL) panel virtual
 
-browser: $(VENV)/.test docs | tools ## the panel's page in a real browser, beside a board in simulation; and the pages (some minutes, alone on the machine)
+browser: $(VENV)/.test docs | tools ## the panel's page and these pages in a real browser (some minutes, alone on the machine)
 	@HARDWALL_BROWSER=1 $(RUN) pytest -n 0 tests/host/panel/test_page.py tests/test_site.py $(ARGS)
 
 screenshots: $(VENV)/.test | tools ## the pictures of the panel's page, anew, by a browser
@@ -142,7 +142,7 @@ docs: $(VENV)/.docs | tools ## the pages as a site in build/docs, every link ins
 diagrams: $(VENV)/.docs | tools ## draw the diagrams of the pages anew, from the code that they show
 	@$(RUN) docs.diagrams.draw
 
-results: $(VENV)/.docs | tools ## the reports of pages and README: those whose sources have changed, or ONLY="NAMES" (half an hour)
+results: $(VENV)/.docs | tools ## the reports of pages and README whose sources have changed, or ONLY="NAMES" (half an hour)
 	@PYTHONPATH=tests $(VENV)/bin/python docs/reports.py $(if $(LIST),--list) $(ONLY)
 	@PYTHONPATH=tests $(VENV)/bin/python docs/for_readme.py
 
@@ -151,7 +151,7 @@ digests: $(VENV)/.test | tools ## record anew what the program computes, and sho
 
 soak fuzz: PYTEST += -o faulthandler_timeout=0
 
-soak: $(VENV)/.test | tools ## 10^9 samples of every estimator, every digest, every loop whole, RTL and model with new seeds
+soak: $(VENV)/.test | tools ## the long campaigns, with new seeds: 10^9 samples of every estimator, every loop whole
 	@echo "HARDWALL_ENDURANCE=$(ENDURANCE)"
 	@HARDWALL_ENDURANCE=$(ENDURANCE) $(PYTEST) tests/test_endurance.py
 	@HARDWALL_DIGESTS=all HARDWALL_LOOPS=all $(PYTEST)
@@ -160,7 +160,7 @@ soak: $(VENV)/.test | tools ## 10^9 samples of every estimator, every digest, ev
 	  HARDWALL_SEED=$$seed HARDWALL_SAMPLES=$(SAMPLES) $(PYTEST) -m rtl $(ARGS); \
 	done
 
-fuzz: $(VENV)/.test | tools ## 20 000 hostile calls of the command line, and 200 runs ended at random times (an hour or two)
+fuzz: $(VENV)/.test | tools ## 20 000 hostile calls of the command line, and 200 killed runs (hours)
 	@HARDWALL_FUZZ=$(CALLS) HARDWALL_KILLS=$(KILLS) $(PYTEST) tests/test_fuzz.py tests/test_killed.py $(ARGS)
 
 matrix: $(VENV)/.test | tools ## the wheel with each extra, installed elsewhere: oldest and newest packages, every Python (half an hour)
@@ -224,19 +224,22 @@ INTERPRETER := $(if $(STALE),$(PYTHON),$(VENV)/bin/python)
 
 $(VENV)/.made: $(if $(STALE),FORCE) | tools
 	@"$(PYTHON)" -m venv $(if $(MADE_IN),--clear) $(VENV)
-	@$(PIP) install --quiet --require-hashes --requirement <(sed -n '/^uv==/,/[^\]$$/p' $(LOCK)) 2>$(VENV)/uv.log || true
+	@$(PIP) install --quiet --require-hashes --requirement <(sed -n '/^uv==/,/[^\]$$/p' $(LOCK)) 2>$(VENV)/uv.log || \
+	  if grep -q 'DO NOT MATCH THE HASHES' $(VENV)/uv.log; then cat $(VENV)/uv.log >&2; exit 1; fi
 	@printf '%s\n' "$(PYTHON)" >$(VENV)/.python
 	@printf '%s\n' "$(CURDIR)" >$@
 
 # Every version is that of $(LOCK), whose hashes uv checks. Where uv is not to be had, or finds no package, pip takes its
-# place: it checks no hash, for it cannot where a tree is installed in place. Only one installer runs at a time, even in a
-# parallel make; of its output, only the large packages and the end are shown. Yosys and the placers compile themselves
-# when they run first, into a file of the user's which all runs read: two first runs at a time would break each other, so
-# they have theirs here.
+# place: it checks no hash, for it cannot where a tree is installed in place. Any other failure of uv ends the task: a
+# file with another hash must not come in by pip. Only one installer runs at a time, even in a parallel make; of its
+# output, only the large packages and the end are shown. Yosys and the placers compile themselves when they run first,
+# into a file of the user's which all runs read: two first runs at a time would break each other, so they have theirs here.
 LOCK := requirements.lock
 UNHASHED := sed '/--hash/d; s/ *\\$$//' $(LOCK) >$(VENV)/constraints.txt
 PIP := $(RUN) pip --disable-pip-version-check
 UV := $(VENV)/bin/uv
+# How uv begins when an index cannot be reached, or has no such package.
+FOUND_NONE := ^error: (No solution found|Failed to fetch:)
 SAYS := s/^Downloading \(.*\)/  \1/p; s/^Collecting \([^ ]*\).*/  \1/p; s/^Installed/  installed/p; \
   s/^Installing collected packages.*/  unpacking all of these/p
 define install
@@ -245,7 +248,11 @@ define install
     --build-constraint $(LOCK) --editable '.[$(1)]' 2>&1 | tee $(VENV)/uv.log | sed -un '$(SAYS)'; }; \
   by_pip() { $(UNHASHED); PIP_CONSTRAINT=$(VENV)/constraints.txt $(PIP) install --progress-bar off \
     --editable '.[$(1)]' | sed -un '$(SAYS)'; }; \
-  if by_uv; then rm $(VENV)/uv.log; else tail -n 1 $(VENV)/uv.log 2>/dev/null || true; echo "  by pip, without uv:"; by_pip; fi; \
+  if by_uv; then rm $(VENV)/uv.log; \
+  elif [ ! -x $(UV) ] || grep -Eq '$(FOUND_NONE)' $(VENV)/uv.log; then \
+    tail -n 1 $(VENV)/uv.log 2>/dev/null || true; echo "  by pip, without uv:"; by_pip; \
+  else cat $(VENV)/uv.log >&2; \
+    echo "hardwall: uv failed (see above), and pip does not take its place, for it checks no hash" >&2; exit 1; fi; \
   $(foreach tool,$(3),$(VENV)/bin/yowasp-$(tool) --version >/dev/null 2>&1;) \
   echo "  done in $$((SECONDS - began)) s"
 @touch $@
@@ -297,8 +304,8 @@ tools: export CHECK = $(CHECK_PYTHON)
 tools:
 	@missing=0; \
 	needs() { echo "hardwall needs $$1: install the Debian or Ubuntu package $$2" >&2; missing=1; }; \
-	if [[ $$PWD =~ [[:space:]] ]]; then \
-	  echo "hardwall needs a path without spaces, for Verilator's makefiles" >&2; missing=1; fi; \
+	if [[ $$PWD == *[[:space:]\$$:#%]* ]]; then \
+	  echo 'hardwall needs a path without spaces and without $$ : # %, for Verilator and make' >&2; missing=1; fi; \
 	if ! command -v "$(INTERPRETER)" >/dev/null; then needs "Python 3.11 or newer, and there is no $(INTERPRETER)" python3; \
 	elif ! fault=$$("$(INTERPRETER)" -c "$$CHECK" 2>&1); then needs "$${fault%|*}" "$${fault##*|}"; fi; \
 	command -v c++ >/dev/null || needs "a C++ compiler, c++" g++; \

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from ..model.axes.axis import AxesSpec
-from ..model.checks import shown
+from ..model.checks import FieldError, shown
 from ..model.runtime.result import Values
 from ..model.spec import AxisSpec
 from ..sim.boards.description import BOARDS, Description, Memory
@@ -45,7 +45,7 @@ def command(
         raise BadInput(f"--program must be one of {', '.join(on.loads)} for {on.name}, not {program!r}")
     of = scene_on(on, options.changes(controller__estimator=estimator), scene)
     path = _free(folder)
-    order = Order(on, of.name, spec_on(of, axes), of.glitch_clocks, seeds)
+    order = Order(on, of.name, spec_on(of, axes, on), of.glitch_clocks, seeds)
     with log.status(f"{on.name}: Yosys, then nextpnr until a seed reaches {of.spec.clock_hz / 1e6:g} MHz"):
         report = build(order, path)
     options.finish(Values(report))
@@ -68,17 +68,23 @@ def scene_on(board: Description, changes: dict[str, Any], scene: str | None) -> 
     return load(scene, changes) if scene is not None else load(board.scene, board.changes | changes)
 
 
-def spec_on(scene: Scene, axes: int | None) -> AxisSpec | AxesSpec:
+def spec_on(scene: Scene, axes: int | None, board: Description | None) -> AxisSpec | AxesSpec:
     """Return the axis of a scene, or several with its requirements, each with the pulses that a board gives it.
 
     Raises:
-        BadInput: if the scene has a drive stage of its own, which no axis of several has.
+        BadInput: if the scene has a drive stage of its own, which no axis of several has, or the board has no pins for
+            so many.
         FieldError: if the axes cannot be.
     """
     if axes is None:
         return scene.spec
     if scene.drive is not None:
         raise BadInput(f"--axes must be absent for a scene with a drive stage, not {axes}")
+    try:
+        if board:
+            board.of_axes(axes)
+    except FieldError as error:
+        raise BadInput(f"--{error}") from None
     return AxesSpec(axes=axes, **scene.requirements)
 
 

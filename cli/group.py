@@ -1,6 +1,5 @@
 """The commands by name. The module of a command is imported only when the command runs, or shows its own help."""
 
-import importlib.metadata
 import os
 import sys
 from importlib import import_module
@@ -9,6 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from ..model.runtime.extras import version_of_project
 from .errors import BadInput
 from .terminal import hear_stages
 
@@ -88,7 +88,7 @@ def loaded(name: str) -> Any:
 
 def _version(wanted: bool) -> None:
     if wanted:
-        print(f"hardwall {importlib.metadata.version('hardwall')}")
+        print(f"hardwall {version_of_project() or 'without a version, for its folder was copied'}")
         raise typer.Exit
 
 

@@ -19,7 +19,8 @@ def command(
     estimator: EstimatorOption = None,
     axes: AxesOption = None,
 ) -> None:
-    of = scene_on(board_of(device), options.changes(controller__estimator=estimator), scene)
+    on = board_of(device)
+    of = scene_on(on, options.changes(controller__estimator=estimator), scene)
     with log.status(f"{device}: Yosys, then nextpnr with {seeds} seeds"):
-        report = synthesise(spec_on(of, axes), device, range(1, seeds + 1), of.glitch_clocks)
+        report = synthesise(spec_on(of, axes, on), device, range(1, seeds + 1), of.glitch_clocks)
     options.finish(Values({"scene": of.name} | report))

@@ -38,7 +38,7 @@ def command(
 ) -> None:
     on = None if board is None else board_named("--board", board)
     changes = changes_of(set_, controller__estimator=estimator)
-    spec = spec_on(scene_on(on, changes, scene) if on else load(scene or DEFAULT, changes), axes)
+    spec = spec_on(scene_on(on, changes, scene) if on else load(scene or DEFAULT, changes), axes, on)
     beside = files_around(spec, on) if on else {}
     if not folder:
         raise BadInput("-o must be a folder, not ''")

@@ -1,4 +1,4 @@
-// iCEBreaker v1.0e: the clock of `board` is 24000000 Hz, from 12000000 Hz by DIVR 0, DIVF 63, DIVQ 5; VCO 768 MHz.
+// iCEBreaker v1.0e: the clock of `board` is 24000000 Hz, its drive pdm. The clock is made of 12000000 Hz by DIVR 0, DIVF 63, DIVQ 5; VCO 768 MHz.
 // Generated; the pins are in the file of constraints beside it, and what to connect to them in WIRING.md.
 
 module top (

@@ -1,4 +1,4 @@
-// Tang Nano 9K: the clock of `board` is 27000000 Hz, the oscillator's own.
+// Tang Nano 9K: the clock of `board` is 27000000 Hz, its drive pdm. The clock is the oscillator's own.
 // Generated; the pins are in the file of constraints beside it, and what to connect to them in WIRING.md.
 
 module top (

@@ -1,4 +1,4 @@
-// ULX3S, PCB v2.x.x and v3.0.x: the clock of `board` is 50000000 Hz, from 25000000 Hz by CLKI_DIV 1, CLKFB_DIV 1, CLKOP_DIV 24, CLKOS_DIV 12; VCO 600 MHz.
+// ULX3S, PCB v2.x.x and v3.0.x: the clock of `board` is 50000000 Hz, its drive pdm. The clock is made of 25000000 Hz by CLKI_DIV 1, CLKFB_DIV 1, CLKOP_DIV 24, CLKOS_DIV 12; VCO 600 MHz.
 // Generated; the pins are in the file of constraints beside it, and what to connect to them in WIRING.md.
 
 module top (

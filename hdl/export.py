@@ -17,7 +17,7 @@ from hardwall.model import register_texts
 from hardwall.model.axes.axis import AxesSpec
 from hardwall.model.axis.registers import RegisterMap
 from hardwall.model.runtime.build_folder import home_for_tools
-from hardwall.model.runtime.whole_file import whole_file
+from hardwall.model.runtime.whole_file import write_files
 from hardwall.model.spec import AxisSpec
 
 from .any_part import AnyPart
@@ -53,14 +53,18 @@ def _with_start(text: str) -> str:
 
 @contextmanager
 def _home_for_yosys() -> Iterator[None]:
-    """Give Yosys, which runs in a process of its own, a home where the user has none."""
+    """Give Yosys, which runs in a process of its own, a home where the user has none that it can use."""
     given = home_for_tools()
+    before = {name: os.environ.get(name) for name in given}
     os.environ.update(given)
     try:
         yield
     finally:
-        for name in given:
-            del os.environ[name]
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def to_verilog(component: wiring.Component, name: str) -> str:
@@ -177,7 +181,7 @@ def write(spec: AxisSpec | AxesSpec, folder: Path, beside: Mapping[str, str]) ->
 
     Of an axis, `axis.v`, `board.v` and `axi.v` have their ports in `ports.md`; the registers of the last two are in
     `registers.md` and `registers.json`. Of several axes there are `axes.v` and `board.v`, and the same pages of both.
-    The text depends only on the spec and on the versions of this project and its Yosys.
+    The text depends only on the spec and on the versions of this project and its Yosys. All files are written, or none.
 
     Args:
         spec: the axis, or several.
@@ -191,7 +195,4 @@ def write(spec: AxisSpec | AxesSpec, folder: Path, beside: Mapping[str, str]) ->
     files = {**(_files_of_axes(spec) if isinstance(spec, AxesSpec) else _files(spec)), **beside}
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    for name, text in files.items():
-        with whole_file(folder / name) as part:
-            part.write_text(text, encoding="utf-8", newline="\n")
-    return tuple(folder / name for name in files)
+    return write_files(folder, files)

@@ -1,9 +1,10 @@
 """The C header `registers.h`: how a program on a PC, or on a processor beside the axis, reaches every register.
 
 `c_header` has the registers' meaning, sign, LSB and range, the states and the masks. Here each register also gets its
-address for Modbus and, for the AXI4-Lite bus of `axi.v`, its byte offset. The two differ: a register has two bytes, so
-the offset is twice the address. A pulse or a counter has half a word of the bus, and the register with the even address
-is the upper half: on a little-endian processor its two bytes come last.
+address for Modbus and, for the AXI4-Lite bus of `axi.v`, its byte offset. The two differ. A value of two registers is a
+whole word of the bus, at twice its address. A pulse or a counter is half a word: the upper half if its address is even.
+A little-endian processor has the lower half first, so the two halves of a word change places: the offset is twice
+`address ^ 1`.
 """
 
 from collections.abc import Iterator
@@ -36,7 +37,10 @@ NAMES_OF_AXES = """\
 
 
 def offset_of(register: Register) -> int:
-    """Return the offset of a register on the AXI4-Lite bus (bytes), for a little-endian processor."""
+    """Return the offset of a register on the AXI4-Lite bus (bytes), for a little-endian processor.
+
+    It is twice the address only for a value of two registers. A store at twice the address of `disarm` would arm.
+    """
     return 2 * (register.address if register.kind.wide else register.address ^ 1)
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+from hardwall.model.axis.supervisor import WATCHDOG_RESET_MS
 from hardwall.model.estimators.registry import ESTIMATORS
 from hardwall.model.runtime.build_folder import build_dir
 from hardwall.sim.pictures.style import DPI, PAGE_IN
@@ -124,6 +125,16 @@ def test_every_picture_is_as_wide_as_a_page_and_on_a_page(path):
         assert head[:8] == b"\x89PNG\r\n\x1a\n"
         assert int.from_bytes(head[16:20], "big") == width
     assert [name for name in PAGES if f"pictures/{path.name})" in text_of(name)]
+
+
+WATCHDOG = re.compile(r"watchdog`?(?:'s| is| of| \|) (\d+) ms|(\d+) ms unless `supervisor_watchdog`")
+
+
+def test_the_watchdog_has_its_default_on_every_page():
+    found = {name: {int(a or b) for a, b in WATCHDOG.findall(text_of(name))} for name in PAGES}
+    default = {WATCHDOG_RESET_MS}
+    told = {"guide/motor", "reference/host", "reference/safety", "reference/virtual"}
+    assert {name: each for name, each in found.items() if each} == {f"docs/{name}.md": default for name in told}
 
 
 def _modules_on(page: str) -> list[str]:

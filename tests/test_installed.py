@@ -6,6 +6,7 @@ environment, which needs no index and takes seconds. `make matrix` installs them
 their ranges, for every Python on the machine.
 """
 
+import importlib.metadata
 import json
 import os
 import shutil
@@ -14,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from packaging.version import Version
 
 from hardwall.cli.group import COMMANDS
 from support import environments, virtual_boards
@@ -61,6 +63,7 @@ def place(request, wheel):
     def made(*extras: str) -> Iterator[Environment]:
         with environments.environment(request.param, wheel, *extras) as environment:
             assert is_closed(environment)
+            assert request.param.resolution != environments.OLDEST or has_an_older_numba(environment)
             yield environment
 
     return made
@@ -73,6 +76,12 @@ def is_closed(environment: Environment) -> bool:
     assert not {str(ROOT), str(ROOT.parent)} & set(done.stdout.split())
     # Root writes everywhere; without another user whom Python is open to, that is not asked.
     return "PermissionError" in done.stderr or (os.geteuid() == 0 and environment.user is None)
+
+
+def has_an_older_numba(environment: Environment) -> bool:
+    """Return whether its Numba, which the model needs, is older than that of the tests."""
+    done = environment.run("python", "-c", "print(__import__('importlib.metadata').metadata.version('numba'))")
+    return Version(done.stdout.strip()) < Version(importlib.metadata.version("numba"))
 
 
 def page(name: str) -> Block:
@@ -106,8 +115,10 @@ def test_the_extra_sim_hits_and_replays(place, tmp_path):
     with place("sim") as environment:
         forces = report(environment.run(*HIT, "--backend", "float"))["max_force_n"]
         assert forces == pytest.approx(12.56, abs=0.01)
-        keeping = {"HARDWALL_BUILD": environment.work / "mäde"}
-        fixed = environment.run(*HIT, HOME="/nonexistent", **keeping)
+        # A home that is not there, and that what runs here cannot make.
+        home = environment.folder / "home"
+        keeping = {"HARDWALL_BUILD": environment.work / "mäde", "HOME": home}
+        fixed = environment.run(*HIT, **keeping)
         rtl = (*HIT, "--backend", "rtl")
         done = environment.run(*rtl, path=without_a_compiler(environment), **keeping)
         assert (done.returncode, done.stdout) == (1, "")
@@ -116,6 +127,9 @@ def test_the_extra_sim_hits_and_replays(place, tmp_path):
         )
         built = environment.run(*rtl, path=os.environ["PATH"], **keeping)
         assert report(built)["force_sha256"] == report(fixed)["force_sha256"]
+        written = environment.run("hardwall", "verilog", "--board", "icebreaker", "-o", "files", **keeping)
+        assert (written.returncode, written.stderr) == (0, "")
+        assert not home.exists()
         assert environment.run("python", "-c", page("docs/guide/start.md").text).returncode == 0
         replay = "hardwall", "replay", "recording.csv", "--column", "counts", "--plot", "replay.png", "--json"
         assert report(environment.run(*replay, **keeping))["samples"] == 2000

@@ -13,7 +13,8 @@
 #define STORE16(axis, offset, half) (*(volatile uint16_t *)((axis) + (offset)) = (half))
 #endif
 
-/* Show the supervisor that the program lives: at least every 200 ms while the axis is armed. */
+/* Show the supervisor that the program lives. While the axis is armed, beat again before the time of the word
+ * supervisor_watchdog is over, less 1 ms. */
 void axis_beat(volatile uint8_t *axis)
 {
     uint32_t last = LOAD32(axis, HARDWALL_HEARTBEAT_OFFSET);

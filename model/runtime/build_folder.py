@@ -5,6 +5,7 @@ written there.
 """
 
 import atexit
+import functools
 import logging
 import multiprocessing
 import os
@@ -13,6 +14,8 @@ import tempfile
 from pathlib import Path
 
 LOGGER = logging.getLogger("hardwall")
+CACHES = "wasmtime", "YoWASP"
+"""The folders in a user's cache of Amaranth's Yosys, and of Yosys and the placers for bitstreams."""
 SHOWN_MAX = 200
 """The most characters of a path in a message."""
 _said: set[str] = set()
@@ -39,29 +42,74 @@ def build_dir() -> Path:
     root = Path(__file__).absolute().parents[2]
     if (root / "pyproject.toml").exists():
         return root / "build"
-    if cache := os.environ.get("XDG_CACHE_HOME"):
-        return Path(cache) / "hardwall"
-    try:
-        return Path.home() / ".cache" / "hardwall"
-    except RuntimeError:
-        return _for_this_process()
+    cache = _cache_of_the_user()
+    return cache / "hardwall" if cache else _for_this_process()
+
+
+def _home() -> Path | None:
+    """Return the user's home; None if the variable is empty or relative, or the system does not know the user."""
+    # Python takes an empty HOME for the root folder, and a relative one as it is.
+    home = os.environ.get("HOME", os.path.expanduser("~"))
+    return Path(home) if os.path.isabs(home) else None
+
+
+def _cache_of_the_user() -> Path | None:
+    """Return the folder for what programs can make again: `$XDG_CACHE_HOME` if it is absolute, else below the home.
+
+    A relative path has no effect: so says the XDG Base Directory Specification, version 0.8, chapter 3.
+    """
+    if os.path.isabs(cache := os.environ.get("XDG_CACHE_HOME", "")):
+        return Path(cache)
+    home = _home()
+    return home / ".cache" if home else None
 
 
 def _for_this_process() -> Path:
     """Return a new folder that is removed at the end; workers find it in the variable."""
+    folder = _temporary()
+    os.environ["HARDWALL_BUILD"] = str(folder)
+    warn_once("no home", "there is no home folder: what this run makes is not kept; HARDWALL_BUILD names a folder")
+    return folder
+
+
+@functools.cache
+def _temporary() -> Path:
+    """Return a folder that is removed at the end of the process."""
     folder = tempfile.mkdtemp(prefix="hardwall-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    os.environ["HARDWALL_BUILD"] = folder
-    warn_once("no home", "there is no home folder: what this run makes is not kept; HARDWALL_BUILD names a folder")
     return Path(folder)
 
 
-def home_for_tools() -> dict[str, str]:
-    """Return the variable that makes the build folder the home of a tool, where the user has none; else nothing.
+def folder_of_tools() -> Path:
+    """Return where tools may write: the build folder, or where that cannot be, a folder that is removed at the end."""
+    return build_dir() if _takes_files(build_dir()) else _temporary()
 
-    Yosys, the placers and ccache keep what they compile below the home, and do not start without one.
+
+def home_for_tools() -> dict[str, str]:
+    """Return the variables that say where a tool keeps what it compiles: below the user's home if it takes files.
+
+    Yosys, the placers and ccache do not start without such a home, or with a relative path. The home itself is not
+    made: a folder that is not there may be meant to stay so.
     """
-    return {} if os.path.expanduser("~") != "~" else {"HOME": str(build_dir())}
+    home, cache = _home(), _cache_of_the_user()
+    if home and cache and (home.is_dir() or home not in cache.parents) and _takes_all(cache):
+        return {"XDG_CACHE_HOME": str(cache)}
+    home = folder_of_tools()
+    return {"HOME": str(home), "XDG_CACHE_HOME": str(home / ".cache")}
+
+
+def _takes_all(cache: Path) -> bool:
+    """Return whether a tool can write to a user's cache, and to its own folder there: another user may have made it."""
+    return _takes_files(cache) and all(_takes_files(each) for name in CACHES if (each := cache / name).exists())
+
+
+def _takes_files(folder: Path) -> bool:
+    """Return whether files can be written to a folder, which is made if it is missing."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK | os.X_OK)
 
 
 def warn_once(kind: str, message: str) -> None:

@@ -25,6 +25,14 @@ class RequirementError(ImportError):
     """A package is absent, or its version is outside the range: one line that says what is needed."""
 
 
+def version_of_project() -> str | None:
+    """Return the version of this project; None without metadata."""
+    try:
+        return version(PROJECT)
+    except PackageNotFoundError:
+        return None
+
+
 def absent(package: str, extra: str | None) -> str:
     """Return the message for a package that is not installed.
 
@@ -32,8 +40,8 @@ def absent(package: str, extra: str | None) -> str:
     """
     of_extra = f"[{extra}]" if extra else ""
     return (
-        f"{package} is not installed: it comes with pip install '.{of_extra}' in the checkout of hardwall, "
-        f"or with pip install 'WHEEL{of_extra}' of its wheel"
+        f"{package} is not installed: it comes with pip install '.{of_extra}' in the checkout of hardwall. "
+        f"With the wheel: pip install 'WHEEL{of_extra}'"
     )
 
 

@@ -1,14 +1,16 @@
 """The core of a board for FuseSoC (CAPI2): the Verilog of an axis, the top and the pins of the board, and its flow."""
 
 import json
-from importlib.metadata import version
 
+from ...model.runtime.extras import version_of_project
 from .description import Description
 from .top import MODULE
 
 CORE = "hardwall.core"
 FLOWS = {".lpf": ("trellis", "LPF"), ".pcf": ("icestorm", "PCF"), ".cst": ("apicula", "CST")}
 """The flow of FuseSoC, and its name for a file of pins, by the end of the file's name."""
+NO_VERSION = "0"
+"""The version that FuseSoC gives to a core without one; this project has none where its folder was copied."""
 
 
 def core(board: Description, clock_hz: int) -> str:
@@ -22,7 +24,7 @@ def core(board: Description, clock_hz: int) -> str:
     lines = [
         "CAPI=2:",
         f"# Generated; the clock of the axis is {clock_hz} Hz.",
-        f"name: hardwall:haptics:{board.name}:{version('hardwall')}",
+        f"name: hardwall:haptics:{board.name}:{version_of_project() or NO_VERSION}",
         f'description: "Haptic axes with their supervisor behind a serial line, on {board.title}"',
         "filesets:",
         "  board:",

@@ -101,7 +101,7 @@ class Description:
             FieldError: if it has no pins for so many.
         """
         if axes > self.most_axes:
-            has_none = f"absent: {self.name} has pins for one axis"
+            has_none = f"absent on {self.name} (its pins are those of a single axis)"
             most = f"at most {self.most_axes} on {self.name}" if self.most_axes else has_none
             raise FieldError("axes", f"must be {most}, not {axes!r}")
         free = iter(

@@ -10,8 +10,8 @@ from .signals import OF_AXIS, OF_STAGE, SHARED_LOOPS, USUAL, Signal, signals_of,
 MODULE = "top"
 INSIDE = {"oscillator", "outputs_enable"}
 """Ports of `board` that are no pins."""
-CLOCK = re.compile(r"// (.+): the clock of `board` is (\d+) Hz")
-"""How a file with `top` begins: the board, and the clock of the axis."""
+HEAD = re.compile(r"\ufeff?// (.+): the clock of `board` is (\d+) Hz, its drive (.+?)\.")
+"""How a file with `top` begins, perhaps behind the mark of UTF-8: the board, the clock of the axis, and its drive."""
 WITHOUT_PLL = """\
     assign clk = pin;
     assign locked = 1'b1;
@@ -31,7 +31,8 @@ def top_verilog(board: Description, clock_hz: int, stage: str = USUAL) -> str:
     """
     pads, names = pads_of(stage), [signal.name for signal in signals_of(stage)]
     held = "pull-downs" if stage == USUAL else "resistors"
-    return _verilog(Top(board, clock_hz, signals_of(stage), pads, {name: name for name in names} | pads, held))
+    connected = {name: name for name in names} | pads
+    return _verilog(Top(board, clock_hz, stage, signals_of(stage), pads, connected, held))
 
 
 def top_of_axes(board: Description, clock_hz: int, axes: int) -> str:
@@ -46,13 +47,33 @@ def top_of_axes(board: Description, clock_hz: int, axes: int) -> str:
     for name in OF_AXIS:
         pins = (f"{name}_{axis}" for axis in reversed(range(axes)))
         connected[name] = f"{{{', '.join(pads.get(pin, pin) for pin in pins)}}}"
-    return _verilog(Top(board, clock_hz, signals_of_axes(axes), pads, connected, "pull-downs"))
+    drive = drive_of_axes(axes)
+    return _verilog(Top(board, clock_hz, drive, signals_of_axes(axes), pads, connected, "pull-downs"))
 
 
-def made_for(text: str) -> tuple[str, int] | None:
-    """Return the board and the clock (Hz) of a `top` that this module wrote; None for any other text."""
-    found = CLOCK.match(text)
-    return (found[1], int(found[2])) if found else None
+class Made(NamedTuple):
+    """What a `top` was made for.
+
+    Attributes:
+        board: the title of the board.
+        clock_hz: the clock of `board`.
+        drive: the drive stage; of several axes, what `drive_of_axes` returns.
+    """
+
+    board: str
+    clock_hz: int
+    drive: str
+
+
+def made_for(text: str) -> Made | None:
+    """Return what a `top` that this module wrote was made for; None for any other text."""
+    found = HEAD.match(text)
+    return Made(found[1], int(found[2]), found[3]) if found else None
+
+
+def drive_of_axes(axes: int) -> str:
+    """Return the drive of several axes as a head names it: one axis of several has other ports than an axis alone."""
+    return f"{USUAL} of axis 0 to {axes - 1}"
 
 
 class Top(NamedTuple):
@@ -61,6 +82,7 @@ class Top(NamedTuple):
     Attributes:
         board: the board.
         clock_hz: the clock of `board`.
+        drive: its drive, as in `Made`.
         signals: its pins.
         pads: pins with buffers, and the wires behind these.
         connected: what the ports of `board` are connected to, but for clock, reset and what is inside.
@@ -69,6 +91,7 @@ class Top(NamedTuple):
 
     board: Description
     clock_hz: int
+    drive: str
     signals: tuple[Signal, ...]
     pads: dict[str, str]
     connected: dict[str, str]
@@ -79,17 +102,16 @@ def _verilog(top: Top) -> str:
     """Return the Verilog of a top."""
     board, clock_hz, pads, held = top.board, top.clock_hz, top.pads, top.held
     setting = board.setting(clock_hz)
-    made = f"{board.title}: the clock of `board` is {clock_hz} Hz"
     if setting is None:
-        how, cell = f"{made}, the oscillator's own.", WITHOUT_PLL
+        how, cell = "The clock is the oscillator's own.", WITHOUT_PLL
     else:
         dividers = ", ".join(f"{name} {number}" for name, number in setting.dividers)
-        how = f"{made}, from {board.oscillator_hz} Hz by {dividers}; VCO {setting.vco / 1_000_000} MHz."
+        how = f"The clock is made of {board.oscillator_hz} Hz by {dividers}; VCO {setting.vco / 1_000_000} MHz."
         cell = board.part.pll.cell(board.oscillator_hz, setting)
     own = {"clk": "clock", "rst": "rst | ~locked", "oscillator": "oscillator", "outputs_enable": "outputs_enable"}
     connected = top.connected | own
     return f"""\
-// {how}
+// {board.title}: the clock of `board` is {clock_hz} Hz, its drive {top.drive}. {how}
 // Generated; the pins are in the file of constraints beside it, and what to connect to them in WIRING.md.
 
 module top (

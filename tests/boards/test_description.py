@@ -112,7 +112,9 @@ def test_every_signal_of_several_axes_is_a_port_of_their_board():
 def test_more_axes_than_pins_are_refused():
     with pytest.raises(ValueError, match=r"^axes must be at most 8 on ulx3s-85f, not 9$"):
         BOARDS["ulx3s-85f"].of_axes(9)
-    with pytest.raises(ValueError, match=r"^axes must be absent: icebreaker has pins for one axis, not 2$"):
+    with pytest.raises(
+        ValueError, match=r"^axes must be absent on icebreaker \(its pins are those of a single axis\), not 2$"
+    ):
         BOARDS["icebreaker"].of_axes(2)
 
 

@@ -39,8 +39,8 @@ main()
 def comes_with(extra: str) -> str:
     """Return what brings an extra: hardwall is on no package index."""
     return (
-        f"it comes with pip install '.[{extra}]' in the checkout of hardwall, "
-        f"or with pip install 'WHEEL[{extra}]' of its wheel"
+        f"it comes with pip install '.[{extra}]' in the checkout of hardwall. "
+        f"With the wheel: pip install 'WHEEL[{extra}]'"
     )
 
 
@@ -150,6 +150,9 @@ def test_garbage_is_looked_for_as_seldom_as_said():
 def test_the_version_is_the_package_s(monkeypatch, capsys):
     code, out, _ = call(monkeypatch, capsys, "--version")
     assert (code, out) == (0, f"hardwall {importlib.metadata.version('hardwall')}\n")
+    monkeypatch.setattr("hardwall.cli.group.version_of_project", lambda: None)
+    code, out, _ = call(monkeypatch, capsys, "--version")
+    assert (code, out) == (0, "hardwall without a version, for its folder was copied\n")
 
 
 def test_a_command_that_is_none_is_told_all(monkeypatch, capsys):

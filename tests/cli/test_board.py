@@ -46,10 +46,16 @@ def test_several_axes_have_the_rates_of_the_scene(calls, monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        (("synth", "mhz", "--axes", "9"), "the scene's axes must be at most 8 on ulx3s-25f, not 9"),
+        (("synth", "mhz", "--axes", "9"), "--axes must be at most 8 on ulx3s-25f, not 9"),
         (("synth", "mhz", "--axes", "0"), "--axes must be a whole number of 1 to 32, not '0'"),
         (("board", "icebreaker", "--axes", "2", "-o", "out"),
-         "the scene's axes must be absent: icebreaker has pins for one axis, not 2"),
+         "--axes must be absent on icebreaker (its pins are those of a single axis), not 2"),
+        (("synth", "--device", "gw1nr-9", "--axes", "2"),
+         "--axes must be absent on tangnano9k (its pins are those of a single axis), not 2"),
+        (("verilog", "--board", "icebreaker", "--axes", "1", "-o", "out"),
+         "--axes must be absent on icebreaker (its pins are those of a single axis), not 1"),
+        (("verilog", "--board", "ulx3s-25f", "--axes", "9", "-o", "out"),
+         "--axes must be at most 8 on ulx3s-25f, not 9"),
         (("verilog", "mhz", "--axes", "33", "-o", "out"), "--axes must be a whole number of 1 to 32, not '33'"),
         (("synth", "mhz", "--axes", "2", "--estimator", "kalman"),
          "the scene's estimator must be one of fdm, levant, window, not 'kalman'"),

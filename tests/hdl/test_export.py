@@ -1,5 +1,6 @@
 """Verilog and the table of its ports: they list the same ports, and both are the same every time."""
 
+import os
 import re
 import subprocess
 import sys
@@ -58,6 +59,26 @@ def test_table_and_verilog_have_the_same_ports(name, estimator, top):
     assert len(seen) == len(table)
     assert seen == verilog_ports(to_verilog(component, top), top)
     assert all(row["what it is"] for row in table)
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory) -> Path:
+    """Return a folder in which Yosys keeps what it compiles, where there is no home."""
+    return tmp_path_factory.mktemp("kept")
+
+
+@pytest.mark.parametrize("home", ["absent", "relative", "", "/proc/x"])
+def test_yosys_works_without_a_home(kept, tmp_path, monkeypatch, home):
+    axis = Axis(spec("narrow", "fdm"))
+    text = to_verilog(axis, "axis")
+    monkeypatch.setenv("HARDWALL_BUILD", str(kept))
+    monkeypatch.setenv("HOME", str(tmp_path / home) if home == "absent" else home)
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    before = dict(os.environ)
+    assert to_verilog(axis, "axis") == text
+    assert dict(os.environ) == before
+    assert any((kept / ".cache").iterdir())
+    assert not (tmp_path / "absent").exists()
 
 
 @pytest.mark.parametrize(("top", "names"), [("axis", AXIS_PORTS), ("board", BOARD_PORTS), ("axi", AXI_PORTS)])

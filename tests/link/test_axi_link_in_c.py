@@ -13,7 +13,7 @@ from link.processor import make, started
 
 from hardwall.model import register_header
 from hardwall.model.axis.registers import RegisterMap
-from hardwall.model.axis.supervisor import ARMED, DISARMED, names
+from hardwall.model.axis.supervisor import ARMED, DISARMED, TRIPPED, names
 from hardwall.testing import parameters, simulate
 from stimuli.specs import spec
 
@@ -111,19 +111,102 @@ def test_rtl(name, tmp_path):
     simulate(__file__, lambda name, library: make(name), name=name, library=str(compiled(tmp_path, hooked=True)))
 
 
-def test_with_a_pointer_the_example_stores_at_the_byte_offset(tmp_path):
-    """Without a bus, as it is compiled for a processor: memory stands for the axis."""
-    example, memory = ctypes.CDLL(str(compiled(tmp_path, hooked=False))), (ctypes.c_uint8 * (1 << 17))()
-    registers = RegisterMap(spec("mhz"))
-    place = 2 * registers["heartbeat"].address
-    memory[place] = 0xFF
-    example.axis_beat(memory)
-    assert {at: value for at, value in enumerate(memory) if value} == {place + 1: 1}
-    memory[2 * registers["ready"].address] = 1
-    example.axis_arm(memory)
+@pytest.fixture(scope="module")
+def example(tmp_path_factory) -> ctypes.CDLL:
+    """Return the example without a bus, as it is compiled for a processor: memory stands for the axis."""
+    library = ctypes.CDLL(str(compiled(tmp_path_factory.mktemp("example"), hooked=False)))
+    library.axis_wall.argtypes = [ctypes.c_void_p, *2 * [ctypes.c_int32]]
+    return library
+
+
+class Memory:
+    """Memory in the place of an axis: what a store writes, a load reads."""
+
+    def __init__(self):
+        self.bytes = (ctypes.c_uint8 * (1 << 17))()
+        self.registers = RegisterMap(spec("mhz"))
+
+    def _place(self, name: str) -> tuple[int, int]:
+        register = self.registers[name]
+        return register_header.offset_of(register), 2 * register.size
+
+    def __setitem__(self, name: str, word: int) -> None:
+        at, size = self._place(name)
+        self.bytes[at : at + size] = word.to_bytes(size, "little", signed=word < 0)
+
+    def __getitem__(self, name: str) -> int:
+        at, size = self._place(name)
+        return int.from_bytes(bytes(self.bytes[at : at + size]), "little", signed=self.registers[name].format.signed)
+
+    @property
+    def written(self) -> set[int]:
+        """The places that are not 0."""
+        return {at for at, value in enumerate(bytes(self.bytes)) if value}
+
+
+@pytest.fixture
+def memory() -> Memory:
+    return Memory()
+
+
+def test_with_a_pointer_the_example_stores_at_the_byte_offset(example, memory):
+    place = 2 * memory.registers["heartbeat"].address
+    memory.bytes[place] = 0xFF
+    example.axis_beat(memory.bytes)
+    assert memory.written == {place + 1}
+    assert memory.bytes[place + 1] == 1
+    memory.bytes[2 * memory.registers["ready"].address] = 1
+    example.axis_arm(memory.bytes)
     # The pulse has an odd address: it is the lower half of its word, and so the first two bytes.
-    assert registers["arm"].address % 2
-    assert memory[2 * (registers["arm"].address - 1)] == 1
+    assert memory.registers["arm"].address % 2
+    assert memory.bytes[2 * (memory.registers["arm"].address - 1)] == 1
+
+
+def test_the_beat_after_the_last_word_is_the_first(example, memory):
+    """The bus refuses a word beyond the register's range."""
+    most = memory.registers["heartbeat"].high
+    memory["heartbeat"] = most - 1
+    example.axis_beat(memory.bytes)
+    assert memory["heartbeat"] == most
+    example.axis_beat(memory.bytes)
+    assert memory["heartbeat"] == memory.registers["heartbeat"].low == 0
+
+
+def test_a_wall_at_a_bound_is_written_and_one_beyond_is_not(example, memory):
+    position, stiffness = memory.registers["wall_position"], memory.registers["wall_stiffness"]
+    for outside in (
+        (position.low - 1, stiffness.low), (position.high + 1, stiffness.low),
+        (position.low, stiffness.low - 1), (position.low, stiffness.high + 1),
+    ):  # fmt: skip
+        assert example.axis_wall(memory.bytes, *outside) == 0
+        assert memory.written == set()
+    for inside in ((position.low, stiffness.high), (position.high, stiffness.low)):
+        memory["commit"] = 0
+        assert example.axis_wall(memory.bytes, *inside) == 1
+        assert (memory["wall_position"], memory["wall_stiffness"], memory["commit"]) == (*inside, 1)
+
+
+@pytest.mark.parametrize("state", [DISARMED, ARMED, TRIPPED])
+@pytest.mark.parametrize("ready", [0, 1])
+def test_arming_returns_whether_the_axis_is_armed(example, memory, ready, state):
+    memory["ready"], memory["state"] = ready, state
+    assert example.axis_arm(memory.bytes) == (ready and state == ARMED)
+    assert (memory["arm"], memory["heartbeat"]) == (ready, 1)
+
+
+@pytest.mark.parametrize("state", [DISARMED, ARMED, TRIPPED])
+def test_only_a_trip_is_acknowledged(example, memory, state):
+    memory["state"], memory["latched"] = state, 0b101
+    tripped = state == TRIPPED
+    assert example.axis_acknowledge(memory.bytes) == 0b101 * tripped
+    assert (memory["acknowledged"], memory["acknowledge"]) == (0b101 * tripped, tripped)
+
+
+def test_the_drive_has_its_sign(example, memory):
+    example.axis_driven.restype = ctypes.c_int32
+    for word in (memory.registers["driven"].format.min, -1, memory.registers["driven"].format.max):
+        memory["driven"] = word
+        assert example.axis_driven(memory.bytes) == word
 
 
 def test_the_program_on_the_page_compiles(tmp_path):

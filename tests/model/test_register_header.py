@@ -9,12 +9,14 @@ from hardwall.model.axes.registers import AxesMap
 from hardwall.model.axis import supervisor
 from hardwall.model.axis.register_file import CELL_BITS, Design
 from hardwall.model.axis.registers import CAPTURE, MAP, RegisterMap
+from hardwall.model.estimators.registry import ESTIMATORS
 from hardwall.model.link.axi import Response, Subordinate
 from hardwall.model.register import Kind
 from hardwall.model.register_texts import c_header
-from stimuli.specs import spec
+from stimuli.specs import SPECS, spec
 from stimuli.supervised import supervised
 from stimuli.supervised_axes_world import slow
+from support.pages import text_of
 
 REGISTERS = supervised("mhz")
 HEADER = register_header.header(REGISTERS)
@@ -69,12 +71,53 @@ def test_a_load_and_a_store_at_the_offset_reach_the_register_on_the_bus(register
         assert bus.write(offset, 0, lanes) == Response.DECERR
 
 
+RULE = re.compile(r"^\| (a [^|]*?) \| 2 · address(?: ([+-]) (\d))? \| (\d+) \|$", re.M)
+RULES = {
+    row: (int(f"{sign}{more or 0}"), int(bits))
+    for row, sign, more, bits in RULE.findall(text_of("docs/reference/link.md"))
+}
+"""What the page says of a kind of register: the bytes beside twice its address, and the bits of a load or store."""
+ROWS = (
+    "a value of 32 bits",
+    "a pulse or a counter at an even address",
+    "a pulse or a counter at an odd address",
+)
+
+
+@pytest.mark.parametrize("name", SPECS)
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_the_rule_on_the_page_is_the_offset_of_every_register(name, estimator):
+    assert set(RULES) == set(ROWS)
+    registers, seen = supervised(name, estimator).registers, set()
+    for register in registers:
+        row = ROWS[0 if register.kind.wide else 1 + register.address % 2]
+        more, bits = RULES[row]
+        assert (2 * register.address + more, bits) == (register_header.offset_of(register), 16 * register.size)
+        seen.add(row)
+    assert seen == set(ROWS)
+
+
+def test_a_store_at_twice_the_address_of_disarm_arms_as_the_page_warns():
+    bus, place = Subordinate(Design(REGISTERS)), 2 * REGISTERS["disarm"].address
+    assert place != NUMBERS["DISARM_OFFSET"]
+    assert bus.write(place, 1 << 8 * (place % 4), 0b11 << place % 4) == Response.OKAY
+    assert bus.pulses == ("arm",)
+
+
 def test_every_bit_has_the_shift_of_its_mask():
     flags = [f"FLAG_{name}" for name in REGISTERS.spec.design.flags]
     record = [f"RECORD_FLAG_{name}" for name in REGISTERS.capture.flags]
     for name in (*flags, *record, *(f"CAUSE_{cause}" for cause in supervisor.names(supervisor.ALL))):
         assert NUMBERS[name.upper()] == 1 << NUMBERS[f"{name.upper()}_SHIFT"]
     assert NUMBERS["LATCHED_MASK"] == supervisor.ALL
+
+
+def test_a_mask_of_a_register_has_all_bits_that_it_can_have():
+    masks = {name.removesuffix("_MASK"): value for name, value in NUMBERS.items() if name.endswith("_MASK")}
+    whole = {name: mask for name, mask in masks.items() if not name.startswith("COUNTS_")}
+    bits = {"STATE": 2, "FLAGS": len(REGISTERS.spec.design.flags), "CAPTURE_STATE": 3}
+    bits |= dict.fromkeys(("LATCHED", "FIRST"), len(supervisor.names(supervisor.ALL)))
+    assert whole == {name: (1 << width) - 1 for name, width in bits.items()}
 
 
 def test_the_fields_of_the_counts_are_a_number_of_each_cause():
@@ -89,8 +132,9 @@ def test_the_fields_of_the_counts_are_a_number_of_each_cause():
     }
 
 
-def test_a_record_is_found_in_the_window():
-    """Its register 6 has an even address, and so is the upper half of its word."""
+def test_the_windows_and_a_record_are_found():
+    """A window begins at twice its address. Register 6 of a record is the upper half of a word: its address is even."""
+    assert NUMBERS["MAP_OFFSET"] == 0x8000
     assert (NUMBERS["CAPTURE_OFFSET"], NUMBERS["RECORD_BYTES"], NUMBERS["RECORD_FLAGS_OFFSET"]) == (0x10000, 16, 14)
 
 

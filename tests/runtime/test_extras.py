@@ -50,8 +50,8 @@ def test_what_is_absent_is_named_with_its_extra(installed, extra):
     with pytest.raises(extras.RequirementError) as caught:
         extras.need(extra)
     assert str(caught.value) == (
-        f"{package} is not installed: it comes with pip install '.{of_extra}' in the checkout of hardwall, "
-        f"or with pip install 'WHEEL{of_extra}' of its wheel"
+        f"{package} is not installed: it comes with pip install '.{of_extra}' in the checkout of hardwall. "
+        f"With the wheel: pip install 'WHEEL{of_extra}'"
     )
 
 
@@ -86,6 +86,12 @@ def test_an_import_that_fails_is_told_by_the_module():
     assert extras.lacking(extras.RequirementError("a line")) == "a line"
 
 
+def test_the_project_has_the_version_of_its_metadata(installed):
+    assert extras.version_of_project() is None
+    installed["hardwall"] = "0.2.0"
+    assert extras.version_of_project() == "0.2.0"
+
+
 def test_without_metadata_nothing_is_checked(monkeypatch):
     def requires(name: str) -> list[str]:
         raise PackageNotFoundError(name)
@@ -94,7 +100,12 @@ def test_without_metadata_nothing_is_checked(monkeypatch):
     extras.need("host")
 
 
-ROOMS = {"hdl": "amaranth", "host": "pymodbus", "host.panel": "nicegui", "sim.scene": "dask", "testing": "cocotb"}
+OF_SIM = ("estimates", "loop", "scene", "studies", "virtual", "walls", "world")
+ROOMS = {
+    **{"hdl": "amaranth", "host": "pymodbus", "host.panel": "nicegui", "sim.rtl": "pylibfst", "testing": "cocotb"},
+    **{f"sim.{room}": "dask" for room in OF_SIM},
+}
+"""The rooms that need packages, each with one of them."""
 PROGRAM = """
 import importlib.metadata as metadata
 version = metadata.version

@@ -1,7 +1,7 @@
 """The package as others get it: built from a copy of the tree, and installed outside of it.
 
-The environments are hostile. Their site-packages cannot be written. There is no home folder, their path has a letter
-beyond ASCII, and where the tests run as root, another user runs what is in them.
+The environments are hostile. Their site-packages cannot be written. There is no home folder. Their path has a letter
+beyond ASCII. Where root runs the tests, another user runs the environments.
 """
 
 import importlib.metadata
@@ -25,6 +25,8 @@ from .archives import ROOT, commit_time_s, normalise
 STRANGER = 54321
 """A user of whom the system knows nothing: without a name, a home or a file."""
 BUILD = "import sys; from setuptools import build_meta; build_meta.build_{kind}(sys.argv[1])"
+OLDEST, NEWEST = "lowest-direct", "highest"
+"""The oldest and the newest packages of the ranges, as uv calls them."""
 WRITE = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
 
 
@@ -33,9 +35,9 @@ class Source:
     """Where the packages of an environment come from.
 
     Attributes:
-        interpreter: the Python; None for one of the running version that a stranger can start, if there is one.
-        resolution: `highest` or `lowest-direct`, as uv calls it, for packages that are installed; None for the packages
-            of the running environment, of which the files are linked: quick, and without an index.
+        interpreter: the Python; None for one of the running version. A stranger can start it, if there is such a one.
+        resolution: `OLDEST` or `NEWEST` packages of the index; None for those of the running environment. Their files
+            are linked, which is quick and needs no index.
     """
 
     interpreter: str | None = None
@@ -68,7 +70,7 @@ class Environment:
         return next((self.folder / "lib").glob("python3.*/site-packages"))
 
     def run(self, *command: object, path: object = "", **environ: object) -> subprocess.CompletedProcess:
-        """Run a command of the environment with nothing in its own environment but what is given.
+        """Run a command of the environment. It sees the variables that are given, and no others.
 
         Args:
             command: its words, with the name of a program of the environment as the first one.
@@ -119,7 +121,7 @@ def _made(kind: str, tree: Path, place: Path, pattern: str) -> Path:
 def sources(interpreters: Iterable[str]) -> list[Source]:
     """Return the oldest and the newest packages of each Python that is there and starts."""
     found = [path for path in map(shutil.which, interpreters) if path and _starts(path, None)]
-    return [Source(each, resolution) for each in found for resolution in ("lowest-direct", "highest")]
+    return [Source(each, resolution) for each in found for resolution in (OLDEST, NEWEST)]
 
 
 @contextmanager
@@ -138,7 +140,7 @@ def environment(source: Source, wheel: Path, *extras: str) -> Iterator[Environme
         made.work.mkdir()
         made.work.chmod(0o777)
         if source.resolution:
-            _install(source.resolution, made, f"{wheel}[{','.join(extras)}]")
+            _install(source.resolution, made, wheel, extras)
         else:
             python = str(made.folder / "bin/python")
             _checked(
@@ -153,10 +155,19 @@ def environment(source: Source, wheel: Path, *extras: str) -> Iterator[Environme
         shutil.rmtree(place)
 
 
-def _install(resolution: str, made: Environment, what: str) -> None:
-    """Install the wheel with what it needs from the index, by uv."""
-    options = ["--python", str(made.folder / "bin/python"), "--resolution", resolution, "--compile-bytecode"]
-    _checked([sys.executable, "-m", "uv", "pip", "install", "--quiet", *options, what])
+def _install(resolution: str, made: Environment, wheel: Path, extras: Iterable[str]) -> None:
+    """Install the wheel with what it needs from the index, by uv.
+
+    The versions are resolved before: of what a wheel needs, uv always takes the newest. The oldest ones are those that
+    have a wheel for the Python: from its release on, Python 3.13 builds no Numba 0.60 and no NumPy 1.26.
+    """
+    uv, python = [sys.executable, "-m", "uv", "pip"], str(made.folder / "bin/python")
+    options = ["--quiet", "--python", python, "--resolution", resolution]
+    options += ["--only-binary", ":all:"] if resolution == OLDEST else []
+    chosen, versions = [f"--extra={extra}" for extra in extras], str(made.folder / "versions.txt")
+    _checked([*uv, "compile", *options, *chosen, "--output-file", versions, str(ROOT / "pyproject.toml")])
+    what = f"{wheel}[{','.join(extras)}]"
+    _checked([*uv, "install", *options, "--constraint", versions, "--compile-bytecode", what])
 
 
 def _interpreter(user: int | None) -> str:

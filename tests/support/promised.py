@@ -25,6 +25,7 @@ PYTHON = (
     *(("model", name) for name in ("velocity", "velocity_of_edges")),
     *(("model.axis", "Axis"), ("model.axis", "step"), ("model.spec", "AxisSpec"), ("model.stamped", "run")),
     ("hdl.verilog_module", "VerilogModule"),
+    ("sim.scene", "spec"),
 )
 
 
