@@ -21,6 +21,9 @@ REST_S = 1.0
 GRACE_S, BURST = 5e-3, 4
 """The time for which the line is kept for the next request of the program that holds the lease, and for how many in a
 row: a beat is two, or four if one is lost. Behind a USB bridge another request in between would take 16 ms."""
+DEAF_S = 0.1
+"""The time for which a program is not heard after bytes that are no request: one that sends nothing else would take the
+processor from the program that holds the lease, whose beats would be late."""
 WRITE_MANY = 16
 CONFORMITY = 0x83
 """The identification has objects of its own."""
@@ -64,6 +67,7 @@ class Relay:
         # Until when the line is kept for the holder, and how many requests in a row it has had.
         self._kept_s, self._in_a_row = 0.0, 0
         self._connections: set[socket.socket] = set()
+        self._ended = threading.Event()
         self._welcoming = threading.Thread(target=self._welcome, name="hardwall-relay", daemon=True)
         self._welcoming.start()
 
@@ -75,6 +79,7 @@ class Relay:
 
     def close(self) -> None:
         """Leave all programs, and close the board's port."""
+        self._ended.set()
         with suppress(OSError):
             self._listener.shutdown(socket.SHUT_RDWR)
         self._listener.close()
@@ -96,11 +101,13 @@ class Relay:
         return holder.name if holder else ""
 
     def _welcome(self) -> None:
-        while True:
+        while not self._ended.is_set():
             try:
                 connection, peer = self._listener.accept()
             except OSError:
-                return
+                # It is closed; or this process has as many files as it may have, until a program leaves.
+                self._ended.wait(REST_S)
+                continue
             if len(self._connections) >= GUESTS_MAX:
                 connection.close()
                 continue
@@ -110,7 +117,7 @@ class Relay:
 
     def _serve(self, connection: socket.socket, peer: tuple[str, int]) -> None:
         """Answer a program until it goes."""
-        name = name_of(peer)
+        name = name_of(peer, connection.getsockname())
         with self._turns:
             guest = self._lease.welcome(name)
         try:
@@ -130,6 +137,7 @@ class Relay:
                         request, begun = begun[:size], begun[size:]
                         if crc(request) or request[0] != UNIT:
                             # As the board itself: silent to what is spoilt, or not for it.
+                            self._ended.wait(DEAF_S)
                             continue
                         connection.sendall(framed(self._answer(guest, request[:-2])))
         finally:
