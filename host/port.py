@@ -225,8 +225,7 @@ class Port:
         try:
             return request.send(self._client)
         except ConnectionException:
-            self._gone = True
-            raise PortError(f"{self.name} is gone: is the cable in, and the board powered?") from None
+            raise self._lost() from None
         except ModbusException:
             if self._in_step:
                 self._in_step = False
@@ -238,6 +237,15 @@ class Port:
                 f"nothing answers at {self.name} at {self._baud} baud: is the board powered and configured, "
                 "and is it this port and this rate?"
             ) from None
+
+    def _lost(self) -> PortError:
+        """Return the error of a port that is gone from now on."""
+        self._gone = True
+        if self.name.startswith(NETWORK) and not self._known:
+            return PortError(
+                f"{self.name} ended the connection at once: it is no board, or has as many programs as it takes"
+            )
+        return PortError(f"{self.name} is gone: is the cable in, and the board powered?")
 
     def _find_step(self) -> None:
         """Let the board repeat random words until it says the last one."""
@@ -267,5 +275,4 @@ class Port:
                 if not self._client.recv(None):
                     return
         except ConnectionException:
-            self._gone = True
-            raise PortError(f"{self.name} is gone: is the cable in, and the board powered?") from None
+            raise self._lost() from None
