@@ -13,6 +13,7 @@ from hardwall.host.connect import connect
 from hardwall.host.errors import HostError
 from hardwall.host.status import State
 from hardwall.model.axis.registers import RegisterMap
+from hardwall.model.runtime.termination import CODES
 from hardwall.sim.scene.load import load
 from support.command_line import call
 from support.processes import HARDWALL, ended, started, wait_until
@@ -42,6 +43,14 @@ class Called(NamedTuple):
 def called(monkeypatch, capsys) -> Callable[..., Called]:
     """Return what calls a command in this process: a process of its own would take a second to begin."""
     return lambda *words: Called(*call(monkeypatch, capsys, *words, *AT))
+
+
+@pytest.fixture
+def hangup_is_heard() -> Iterator[None]:
+    """Let programs that are started hear SIGHUP, though the tests run under nohup."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
 
 
 def state_of(board: VirtualBoard) -> State | None:
@@ -78,16 +87,17 @@ def test_set_writes_and_says_what_is_used(virtual, called):
     assert used["wall_stiffness"] == pytest.approx(1000, abs=REGISTERS["wall_stiffness"].lsb)
 
 
-def test_arm_lasts_as_long_as_its_command(virtual, called):
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_arm_lasts_as_long_as_its_command(virtual, called, hangup_is_heard, number):
     with started(HARDWALL, "arm", virtual.path, "--acknowledge", *AT) as process:
         assert process.stdout.readline().startswith("ARMED ")
         # Another host cannot have the port meanwhile.
         busy = called("disarm", virtual.path)
         assert busy.returncode == 1
         assert "another program has it, and a board has one host at a time" in busy.stderr
-        process.send_signal(signal.SIGINT)
+        process.send_signal(signal.Signals[number])
         code, _, err = ended(process)
-    assert code == 130, err
+    assert code == CODES[signal.Signals[number]][0], err
     assert state_of(virtual) is State.DISARMED
 
 
