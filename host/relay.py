@@ -18,9 +18,10 @@ GUESTS_MAX = 32
 """The most programs at a board."""
 REST_S = 1.0
 """The time behind which what was begun of a request is dropped: the loopback has no such pauses."""
-GRACE_S, BURST = 5e-3, 4
+GRACE_S, BURST = 5e-3, 5
 """The time for which the line is kept for the next request of the program that holds the lease, and for how many in a
-row: a beat is two, or four if one is lost. Behind a USB bridge another request in between would take 16 ms."""
+row: a beat is two, or four if one is lost, behind another one of its program. Behind a USB bridge a request of another
+program in between would take 16 ms."""
 DEAF_S = 0.1
 """The time for which a program is not heard after bytes that are no request: one that sends nothing else would take the
 processor from the program that holds the lease, whose beats would be late."""
