@@ -1,9 +1,13 @@
 """The commands that speak to a board, as they are called, with a board in simulation."""
 
+import errno
 import json
+import os
+import re
 import signal
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -176,6 +180,8 @@ def test_watch_shows_a_line_and_home_finds_the_index(virtual, called):
         (["watch", "PORT", "--seconds", "inf"], 2, "--seconds must be 0 to 1e+06 s, not inf"),
         (["capture", "PORT", "--trigger", "contact,noise"], 2, "--trigger must be of contact, trip, rise, fall, hand,"),
         (["capture", "PORT", "--before", "3000"], 2, "before must be 0 to 2047, not 3000"),
+        (["capture", "PORT", "--last", "--arm"], 2, "--last reads what is there: it goes with no word, --arm, "),
+        (["capture", "PORT", "--last", "--trigger", "trip"], 2, "--last reads what is there: it goes with no word, "),
         (["capture", "PORT", "-o", "hit.csv"], 2, "--out must end in .npz, not 'hit.csv'"),
         (["connect", "PORT", "--identity", "no"], 1, "it has another bitstream"),
         (["connect", "/dev/hardwall-absent"], 1, "cannot be opened: there is none of that name"),
@@ -229,3 +235,27 @@ def test_a_capture_by_hand_and_one_that_does_not_come(virtual, called):
     done = called("capture", virtual.path, "--trigger", "trip", "--before", "0", "--seconds", "2")
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == "hardwall: error: the capture is not DONE in 2 s: it is WAITING"
+
+
+def test_a_capture_whose_file_cannot_be_written_is_read_again(virtual, called, monkeypatch, tmp_path):
+    def full(path: Path, content: bytes) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as context:
+        context.setattr(Path, "write_bytes", full)
+        lost = called("capture", virtual.path, "--trigger", "hand", "--before", "7", "--json", "-o", tmp_path / "a.npz")
+    assert lost.returncode == 1
+    said = f"; the board keeps the capture: `hardwall capture {virtual.path} --last` reads it again\n"
+    assert lost.stderr.endswith(f"a.npz: cannot be written (No space left on device){said}")
+    again = called("capture", virtual.path, "--last", "--json", "-o", tmp_path / "b.npz")
+    assert (again.returncode, again.stdout) == (0, lost.stdout)
+    with np.load(tmp_path / "b.npz") as saved:
+        assert saved["place"] == json.loads(lost.stdout)["before"] == 7
+
+
+def test_there_may_be_no_last_capture(virtual, called):
+    with connect(virtual.path, pace=PACE) as axis:
+        axis.capture.start(["trip"])
+    done = called("capture", virtual.path, "--last")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert re.fullmatch("hardwall: error: the capture is (FILLING|WAITING): wait until it is DONE\n", done.stderr)
