@@ -259,6 +259,28 @@ def test_a_program_that_sends_no_requests_is_not_heard_for_a_while(relay):
             assert time.monotonic() - began_s >= 2 * relays.DEAF_S
 
 
+def test_a_program_that_sends_nothing_but_rubbish_is_left(relay, monkeypatch):
+    monkeypatch.setattr(relays, "DEAF_S", 0.0)
+    spoilt = READ_LAYOUT[:-1] + b"\0"
+    with line_to(relay) as line:
+        # Not in a row.
+        for _ in range(2):
+            answered(line, (relays.RUBBISH_MAX - 1) * spoilt + READ_LAYOUT, 9)
+        line.sendall(relays.RUBBISH_MAX * spoilt)
+        assert line.recv(1) == b""
+    wait_until(lambda: not relay._connections)
+
+
+@pytest.mark.parametrize("request_", [bytes([1, 8, 0, 0, 1, 2]), bytes([1, 0x2B, 14, 4, 0x80])])
+def test_what_is_not_of_the_board_is_answered_after_a_while(relay, request_):
+    with line_to(relay) as line:
+        answered(line, READ_LAYOUT, 9)
+        began_s = time.monotonic()
+        for _ in range(5):
+            answered(line, framed(request_), 8)
+        assert time.monotonic() - began_s >= 5 * relays.OWN_S
+
+
 def test_programs_come_again_when_there_are_files_again(relay, monkeypatch):
     monkeypatch.setattr(relays, "REST_S", 0.05)
     accept, refused = socket.socket.accept, threading.Event()
