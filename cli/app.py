@@ -1,8 +1,8 @@
 """The command line. Results go to stdout, everything else to stderr.
 
-The exit codes are 0, 1 for a failed run, 2 for bad input, 130 after SIGINT, 143 after SIGTERM, and 141 if stdout was
-closed early. This module imports nothing that comes with an extra, so that it can name an extra that is not installed,
-and nothing that takes long: until `main` hears signals, an interrupt is a traceback of Python.
+The exit codes are 0, 1 for a failed run, 2 for bad input, 129 after SIGHUP, 130 after SIGINT, 143 after SIGTERM, and
+141 if stdout was closed early. This module imports nothing that comes with an extra, so that it can name an extra that
+is not installed, and nothing that takes long: until `main` hears signals, an interrupt is a traceback of Python.
 """
 
 import gc

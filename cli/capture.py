@@ -6,11 +6,12 @@ from typing import Annotated, Any
 
 import typer
 
-from ..host import Axis
+from ..host import Axis, NotReadyError
 from ..host.capture import Captured
 from ..host.port import BAUD
 from ..model.axis.capture import DECIMATION_BITS, RECORDS_MAX, SOURCES
 from ..model.checks import shown
+from ..model.runtime import termination
 from ..model.runtime.result import Summary
 from .errors import BadInput
 from .options import output_file, within
@@ -20,8 +21,8 @@ from .set import values_of
 from .terminal import log, progress
 
 DECIMATION_MAX = (1 << DECIMATION_BITS) - 1
-HAND = "hand"
-"""The trigger that a person gives: as soon as enough records are there before it."""
+TRIGGER, HAND = "contact", "hand"
+"""The trigger unless another one is given; and that of a person, as soon as enough records are there before it."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ def command(
     ] = None,
     trigger: Annotated[
         str, typer.Option(metavar="NAME,...", help=f"what triggers: {', '.join((*SOURCES, HAND))}")
-    ] = "contact",
+    ] = TRIGGER,
     before: Annotated[
         int | None,
         typer.Option(min=0, max=RECORDS_MAX, help="records wanted before the trigger", show_default="a quarter of all"),
@@ -67,6 +68,7 @@ def command(
     decimation: Annotated[int, typer.Option(min=1, max=DECIMATION_MAX, help="samples from a record to the next")] = 1,
     level: Annotated[float, typer.Option(metavar="M", help="the position of the triggers rise and fall, m")] = 0.0,
     arm: Annotated[bool, typer.Option("--arm", help="arm the axis first, and disarm it at the end")] = False,
+    last: Annotated[bool, typer.Option("--last", help="read the capture that the board has, and begin none")] = False,
     seconds: Annotated[float, typer.Option(metavar="S", help="the longest wait")] = 60.0,
     baud: BaudOption = BAUD,
     identity: IdentityOption = None,
@@ -76,13 +78,19 @@ def command(
     within(seconds, "--seconds", 0.0, 1e6, "s")
     out = output_file(out, "--out", (".npz",))
     values, sources = values_of(words or []), _sources(trigger)
+    if last and (words or arm or (trigger, before, decimation, level) != (TRIGGER, None, 1, 0.0)):
+        raise BadInput(
+            "--last reads what is there: it goes with no word, --arm, --trigger, --before, --decimation, --level"
+        )
     with axis_at(port, baud, identity, pace) as axis:
         if values:
             axis.set(**values)
         if arm:
             axis.arm()
-        axis.capture.start([source for source in sources if source != HAND], before, decimation, level)
-        captured = _wait(axis, HAND in sources, seconds)
+        if not last:
+            axis.capture.start([source for source in sources if source != HAND], before, decimation, level)
+            _wait(axis, HAND in sources, seconds)
+        captured = _read(axis, port, lives=not last)
     options.finish(Captures(captured), {"records": (out, captured.save)} if out else {})
 
 
@@ -94,12 +102,22 @@ def _sources(text: str) -> list[str]:
     return sources
 
 
-def _wait(axis: Axis, by_hand: bool, seconds: float) -> Captured:
-    """Return a capture when it is done; by hand it is triggered as soon as it waits for that."""
+def _wait(axis: Axis, by_hand: bool, seconds: float) -> None:
+    """Wait until a capture is done; by hand it is triggered as soon as it waits for that."""
     log.print(f"the capture of {axis.capture.records} records waits for its trigger")
     if by_hand:
         axis.capture.until("WAITING", seconds)
         axis.capture.trigger()
     axis.capture.until("DONE", seconds)
-    with progress("reading the capture", axis.capture.records) as advance:
-        return axis.capture.read(advance)
+
+
+def _read(axis: Axis, port: str, lives: bool) -> Captured:
+    """Return the capture of a board that is done. However this run ends, it says that the board keeps the capture."""
+    termination.said_by(lambda: f"the board keeps the capture: `hardwall capture {port} --last` reads it again")
+    try:
+        with progress("reading the capture", axis.capture.records) as advance:
+            return axis.capture.read(advance, lives)
+    except NotReadyError:
+        # It has none, or began another one.
+        termination.begin()
+        raise

@@ -136,7 +136,8 @@ class Axis(Named):
         """
         checks = {"arm": self._check_wanted, "disarm": None}
         check = checks.get(name, self._check_time)
-        self._port.write(self.device.registers[name].address, (1,), once=name not in TWICE, check=check)
+        place, at_once = self.device.registers[name].address, name == "disarm"
+        self._port.write(place, (1,), once=name not in TWICE, check=check, at_once=at_once)
 
     @contextmanager
     def by(self, until_s: float) -> Iterator[None]:

@@ -56,10 +56,15 @@ class BankPort(Port):
         return tuple(registers[place] for place in places)
 
     def write(
-        self, address: int, registers: tuple[int, ...], once: bool = False, check: Callable[[], None] | None = None
+        self,
+        address: int,
+        registers: tuple[int, ...],
+        once: bool = False,
+        check: Callable[[], None] | None = None,
+        at_once: bool = False,
     ) -> None:
         """Write successive registers, all in one request; the arguments and the errors are those of `Port.write`."""
-        self._line.write(address + (0 if address in self._once else self._base), registers, once, check)
+        self._line.write(address + (0 if address in self._once else self._base), registers, once, check, at_once)
 
     def identify(self) -> dict[int, bytes]:
         """Return the objects by which the device identifies itself."""

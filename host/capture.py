@@ -189,11 +189,12 @@ class Capture:
                 raise TimeoutError(f"the capture is not {wanted} in {seconds:g} s: it is {state}")
             self._board.sleep(LOOK_S)
 
-    def read(self, progress: Callable[[int], object] = lambda done: None) -> Captured:
-        """Return a capture that is done, and live meanwhile; the errors are those of `reading`.
+    def read(self, progress: Callable[[int], object] = lambda done: None, lives: bool = True) -> Captured:
+        """Return a capture that is done; the errors are those of `reading`.
 
         Args:
             progress: called with the number of records that are read.
+            lives: whether the lease is renewed meanwhile. Otherwise nothing is written, so that any program may read.
         """
         reading = self.reading()
         while True:
@@ -201,7 +202,8 @@ class Capture:
                 done = next(reading)
             except StopIteration as end:
                 return end.value
-            self._board.sleep(0.0)
+            if lives:
+                self._board.sleep(0.0)
             progress(done)
 
     def reading(self) -> Generator[int, None, Captured]:

@@ -97,7 +97,7 @@ def client_of(name: str, baud: int, wait_s: float) -> SerialClient | NetworkClie
     """Return the client of a port, not yet connected.
 
     Args:
-        name: a serial port's path, or tcp://HOST:PORT.
+        name: a serial port's path, or tcp://HOST:PORT, where an address of IPv6 has brackets.
         baud: the rate of a serial port.
         wait_s: how long it is waited for a connection, and for room to write.
 
@@ -109,6 +109,9 @@ def client_of(name: str, baud: int, wait_s: float) -> SerialClient | NetworkClie
     host, _, number = name.removeprefix(NETWORK).rpartition(":")
     if not host or not re.fullmatch("[0-9]{1,5}", number) or not 0 < int(number) < 1 << 16:
         raise PortError(f"a port of the network must be {NETWORK}HOST:PORT, with a PORT of 1 to 65535, not {name}")
+    if host.startswith("[") and host.endswith("]"):
+        # An address of IPv6, as it stands before a port.
+        host = host[1:-1]
     return NetworkClient(host, port=int(number), framer=FramerType.RTU, timeout=wait_s, retries=0)
 
 
@@ -126,4 +129,7 @@ def reason(error: Exception) -> str:
     if number == errno.EISDIR or "configure" in str(error):
         return "it is no serial port"
     # The number of a name that is not found is not the system's.
-    return os.strerror(number) if number and number > 0 else str(error).rpartition(": ")[2] or str(error)
+    said = os.strerror(number) if number and number > 0 else getattr(error, "strerror", None)
+    if isinstance(error, UnicodeError):
+        said = "no machine has such a name"
+    return said or str(error).rpartition(": ")[2] or str(error)

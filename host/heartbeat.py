@@ -21,7 +21,7 @@ class Beat:
     """One beat: the word of the heartbeat is read, must be that of the last beat, and is written with the next number.
 
     So a reset of the board ends the heartbeat, though the words may have been written again since. A beat whose answer
-    is lost is tried again as a whole, so that a reset behind it is found out too.
+    is lost is tried again as a whole, so that a reset behind it is found out too. What else is asked waits meanwhile.
 
     Args:
         port: the line.
@@ -44,7 +44,7 @@ class Beat:
             ChangedError: if the board has another number.
             HostError: if it is not reached.
         """
-        with self._turn:
+        with self._turn, self._port.first():
             for tries_left in reversed(range(TRIES)):
                 last = self._read()
                 if last not in self._numbers:

@@ -1,6 +1,8 @@
 """Who may write to a board that several programs share: one at a time, and none that does not know what it is now."""
 
 import os
+import socket
+import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -73,10 +75,15 @@ class Lease:
         return self._holder
 
 
-def name_of(peer: tuple[str, int]) -> str:
-    """Return the program at the other end of a connection on this machine, by name and process where that is known."""
+def name_of(peer: tuple[str, int], here: tuple[str, int]) -> str:
+    """Return the program at the other end of a connection on this machine, by name and process where that is known.
+
+    Args:
+        peer: the address and port of that end.
+        here: those of this end.
+    """
     with suppress(OSError, ValueError, IndexError):
-        if process := _process_of(peer):
+        if process := _process_of(peer, here):
             words = (Path("/proc") / process / "cmdline").read_bytes().decode("utf-8", "replace").split("\0")
             return f"{_called(words)}, process {process}"
     return f"a program at {peer[0]}:{peer[1]}"
@@ -91,12 +98,13 @@ def _called(words: list[str]) -> str:
     return "".join(letter for letter in " ".join(shown) if letter.isprintable())[:NAME_MAX]
 
 
-def _process_of(peer: tuple[str, int]) -> str | None:
+def _process_of(peer: tuple[str, int], here: tuple[str, int]) -> str | None:
     """Return the number of the process that has a connection from an address of the loopback, as text."""
-    wanted = f":{peer[1]:04X}"
+    ends = [_in_the_table(peer), _in_the_table(here)]
     for row in Path("/proc/net/tcp").read_text(encoding="ascii").splitlines()[1:]:
         cells = row.split()
-        if cells[1].endswith(wanted):
+        # Other connections may have the same port at one of their ends.
+        if cells[1:3] == ends:
             link = f"socket:[{cells[9]}]"
             break
     else:
@@ -106,3 +114,9 @@ def _process_of(peer: tuple[str, int]) -> str | None:
             if any(os.readlink(file) == link for file in folder.iterdir()):
                 return folder.parent.name
     return None
+
+
+def _in_the_table(end: tuple[str, int]) -> str:
+    """Return an address and its port as the table of connections has them: a number of this machine, in hexadecimal."""
+    number = int.from_bytes(socket.inet_aton(end[0]), sys.byteorder)
+    return f"{number:08X}:{end[1]:04X}"

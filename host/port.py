@@ -4,7 +4,7 @@ import secrets
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from typing import Any
 
 from pymodbus.exceptions import ConnectionException, ModbusException
@@ -16,6 +16,7 @@ from ..model.link.server import FAILURE, READ_MAX, VALUE, WRITE_MAX
 from .clients import client_of, reason
 from .errors import ChangedError, ForeignError, HeldError, PortError, RefusedError, SilentError
 from .leases import HELD, LEASE_OBJECT, NO_ANSWER, STALE
+from .precedence import Precedence
 from .requests import Request
 
 BAUD, BAUD_MAX = 921_600, 4_000_000
@@ -30,6 +31,8 @@ BRIDGE_S = 0.016
 """The time for which a USB bridge keeps what it has received, unless its driver is told otherwise."""
 MACHINE_S = 0.02
 """The time for which this machine may keep an answer, or a request, while it does something else."""
+BEAT_S = 0.15
+"""The longest time for which other requests wait for a beat of which one request is lost."""
 TRIES = 5
 """Attempts to find the beginning of an answer again."""
 PAUSE_S = 0.025
@@ -88,6 +91,7 @@ class Port:
             raise PortError(f"{name} cannot be opened: {reason(error)}") from None
         # A request that waits in a thread of its own is not torn by an interrupt, and none overtakes another.
         self._turns = ThreadPoolExecutor(1, "hardwall-port")
+        self._precedence = Precedence()
 
     def close(self) -> None:
         """Close the port, behind the requests that wait for their turn."""
@@ -122,8 +126,21 @@ class Port:
             registers += self._ask(Request.reading(address + len(registers), some)).registers
         return tuple(registers)
 
+    def first(self) -> AbstractContextManager[None]:
+        """Let the requests of this thread go before those of others, but for what is written at once: for a beat.
+
+        An application that reads all the time would part the requests of a beat. Behind a USB bridge the board would
+        trip after one lost frame.
+        """
+        return self._precedence.taken()
+
     def write(
-        self, address: int, registers: tuple[int, ...], once: bool = False, check: Callable[[], None] | None = None
+        self,
+        address: int,
+        registers: tuple[int, ...],
+        once: bool = False,
+        check: Callable[[], None] | None = None,
+        at_once: bool = False,
     ) -> None:
         """Write successive registers, all in one request.
 
@@ -133,6 +150,7 @@ class Port:
             once: whether it makes a difference that they are written twice. Without an answer they are then not
                 written again.
             check: called in the turn of the request; what it raises is raised, and nothing is written.
+            at_once: whether it does not wait for a beat either.
 
         Raises:
             ValueError: if they are more than a request takes.
@@ -140,7 +158,7 @@ class Port:
         """
         if not 1 <= len(registers) <= WRITE_MAX:
             raise ValueError(f"registers must be 1 to {WRITE_MAX}, not {len(registers)}")
-        self._ask(Request.writing(address, registers), once, check)
+        self._ask(Request.writing(address, registers), once, check, at_once)
 
     def identify(self) -> dict[int, bytes]:
         """Return the objects by which the device identifies itself: 0 its vendor, 1 its product, 2 its revision."""
@@ -165,12 +183,16 @@ class Port:
             return None
         return self._ask(Request.lease()).information[LEASE_OBJECT].decode("utf-8", "replace")
 
-    def _ask(self, request: Request, once: bool = False, check: Callable[[], None] | None = None) -> Any:
+    def _ask(
+        self, request: Request, once: bool = False, check: Callable[[], None] | None = None, at_once: bool = False
+    ) -> Any:
         """Return the answer to a request, which is asked again without one, in a turn of its own each time."""
         until_s, silent = time.monotonic() + self._answer_s, None
         while True:
             if self._gone:
                 raise PortError(f"{self.name} is closed or gone: connect again")
+            if not at_once:
+                self._precedence.wait(BEAT_S / self.pace)
             try:
                 turn = self._turns.submit(self._turn, request, check)
             except RuntimeError:
@@ -225,8 +247,7 @@ class Port:
         try:
             return request.send(self._client)
         except ConnectionException:
-            self._gone = True
-            raise PortError(f"{self.name} is gone: is the cable in, and the board powered?") from None
+            raise self._lost() from None
         except ModbusException:
             if self._in_step:
                 self._in_step = False
@@ -238,6 +259,15 @@ class Port:
                 f"nothing answers at {self.name} at {self._baud} baud: is the board powered and configured, "
                 "and is it this port and this rate?"
             ) from None
+
+    def _lost(self) -> PortError:
+        """Return the error of a port that is gone from now on."""
+        self._gone = True
+        if self.name.startswith(NETWORK) and not self._known:
+            return PortError(
+                f"{self.name} ended the connection at once: it is no board, or has as many programs as it takes"
+            )
+        return PortError(f"{self.name} is gone: is the cable in, and the board powered?")
 
     def _find_step(self) -> None:
         """Let the board repeat random words until it says the last one."""
@@ -267,5 +297,4 @@ class Port:
                 if not self._client.recv(None):
                     return
         except ConnectionException:
-            self._gone = True
-            raise PortError(f"{self.name} is gone: is the cable in, and the board powered?") from None
+            raise self._lost() from None

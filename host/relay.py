@@ -18,9 +18,15 @@ GUESTS_MAX = 32
 """The most programs at a board."""
 REST_S = 1.0
 """The time behind which what was begun of a request is dropped: the loopback has no such pauses."""
-GRACE_S, BURST = 5e-3, 4
+GRACE_S, BURST = 5e-3, 5
 """The time for which the line is kept for the next request of the program that holds the lease, and for how many in a
-row: a beat is two, or four if one is lost. Behind a USB bridge another request in between would take 16 ms."""
+row: a beat is two, or four if one is lost, behind another one of its program. Behind a USB bridge a request of another
+program in between would take 16 ms."""
+DEAF_S, RUBBISH_MAX = 0.1, 16
+"""The time for which a program is not heard after bytes that are no request, and after how many such in a row it is
+left. One that sends nothing else would take the processor from the holder of the lease, whose beats would be late."""
+OWN_S = 0.01
+"""The time after which a request is answered that does not go to the board, for the same reason."""
 WRITE_MANY = 16
 CONFORMITY = 0x83
 """The identification has objects of its own."""
@@ -64,6 +70,7 @@ class Relay:
         # Until when the line is kept for the holder, and how many requests in a row it has had.
         self._kept_s, self._in_a_row = 0.0, 0
         self._connections: set[socket.socket] = set()
+        self._ended = threading.Event()
         self._welcoming = threading.Thread(target=self._welcome, name="hardwall-relay", daemon=True)
         self._welcoming.start()
 
@@ -75,6 +82,7 @@ class Relay:
 
     def close(self) -> None:
         """Leave all programs, and close the board's port."""
+        self._ended.set()
         with suppress(OSError):
             self._listener.shutdown(socket.SHUT_RDWR)
         self._listener.close()
@@ -96,11 +104,13 @@ class Relay:
         return holder.name if holder else ""
 
     def _welcome(self) -> None:
-        while True:
+        while not self._ended.is_set():
             try:
                 connection, peer = self._listener.accept()
             except OSError:
-                return
+                # It is closed; or this process has as many files as it may have, until a program leaves.
+                self._ended.wait(REST_S)
+                continue
             if len(self._connections) >= GUESTS_MAX:
                 connection.close()
                 continue
@@ -110,13 +120,13 @@ class Relay:
 
     def _serve(self, connection: socket.socket, peer: tuple[str, int]) -> None:
         """Answer a program until it goes."""
-        name = name_of(peer)
+        name = name_of(peer, connection.getsockname())
         with self._turns:
             guest = self._lease.welcome(name)
         try:
             with connection, suppress(OSError):
-                begun = b""
-                while True:
+                begun, rubbish = b"", 0
+                while rubbish < RUBBISH_MAX:
                     connection.settimeout(REST_S if begun else None)
                     try:
                         data = connection.recv(FRAME_MAX)
@@ -130,7 +140,10 @@ class Relay:
                         request, begun = begun[:size], begun[size:]
                         if crc(request) or request[0] != UNIT:
                             # As the board itself: silent to what is spoilt, or not for it.
+                            rubbish += 1
+                            self._ended.wait(DEAF_S)
                             continue
+                        rubbish = 0
                         connection.sendall(framed(self._answer(guest, request[:-2])))
         finally:
             self._connections.discard(connection)
@@ -139,12 +152,10 @@ class Relay:
 
     def _answer(self, guest: Guest, request: bytes) -> bytes:
         """Return the answer to a request, both without their CRC."""
-        function, data = request[1], request[2:]
-        if function == DIAGNOSE and data[:2] == ECHO.to_bytes(2, "big"):
-            return request
-        if function == IDENTIFY and data == bytes([DEVICE_IDENTIFICATION, NAMED_OBJECT, LEASE_OBJECT]):
-            name = self.holder.encode()[: FRAME_MAX // 2]
-            return request[:4] + bytes([CONFORMITY, 0, 0, 1, LEASE_OBJECT, len(name)]) + name
+        function = request[1]
+        if (own := self._own_answer(request)) is not None:
+            self._ended.wait(OWN_S)
+            return own
         with self._turns:
             self._wait_for_turn(self._lease.holder is guest)
             if (refused := self._refusal(guest, request)) is not None:
@@ -165,6 +176,16 @@ class Relay:
                 self._in_a_row = self._in_a_row + 1 if self._lease.holder is guest else 0
                 self._kept_s = time.monotonic() + (GRACE_S if 0 < self._in_a_row < BURST else 0.0)
                 self._turns.notify_all()
+
+    def _own_answer(self, request: bytes) -> bytes | None:
+        """Return the answer to a request that does not go to the board; None to one that does."""
+        function, data = request[1], request[2:]
+        if function == DIAGNOSE and data[:2] == ECHO.to_bytes(2, "big"):
+            return request
+        if function == IDENTIFY and data == bytes([DEVICE_IDENTIFICATION, NAMED_OBJECT, LEASE_OBJECT]):
+            name = self.holder.encode()[: FRAME_MAX // 2]
+            return request[:4] + bytes([CONFORMITY, 0, 0, 1, LEASE_OBJECT, len(name)]) + name
+        return None
 
     def _wait_for_turn(self, holds: bool) -> None:
         """Wait, with the lock, until a request of the holder, or of another program, may go out."""

@@ -24,6 +24,7 @@ from .page import add_page
 
 STATIC = Path(__file__).with_name("static")
 LOCAL, EVERYWHERE = "127.0.0.1", ("0.0.0.0", "::")
+BROADCAST = "255.255.255.255"
 LOCALS, HTTP = ("localhost", LOCAL), 80
 """Names of this machine for itself; and the port that an address need not name."""
 REFUSED = "This page needs the whole address that `hardwall panel` printed, as it is, with its token.\n"
@@ -139,7 +140,7 @@ class Listener(NamedTuple):
     """An address that is listened at.
 
     Attributes:
-        host: the address, as it was given.
+        host: the address as it was given; one of `EVERYWHERE` if it is every address.
         socket: the socket there.
     """
 
@@ -158,15 +159,26 @@ def listen(host: str = LOCAL, port: int = 0) -> Listener:
         AddressError: if the address is none of this machine.
         ServerError: if it cannot be had.
     """
+    refused = f"port {port} of {host} cannot be had"
+    none_of_ours = AddressError(f"{refused}: that is no address of this machine")
+    # The system takes an empty name for every address, and one in angle brackets for a broadcast.
+    if not host or host.startswith("<"):
+        raise none_of_ours
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
-        return Listener(host, socket.create_server((host, port), family=family))
+        found = socket.create_server((host, port), family=family)
     except (OSError, UnicodeError) as error:
-        number, refused = getattr(error, "errno", None), f"port {port} of {host} cannot be had"
+        number = getattr(error, "errno", None)
         # Of a name that is none, the number is not the system's.
-        if not number or number < 0 or number == errno.EADDRNOTAVAIL:
-            raise AddressError(f"{refused}: that is no address of this machine") from None
+        if not number or number < 0 or number in (errno.EADDRNOTAVAIL, errno.EINVAL):
+            raise none_of_ours from None
         raise ServerError(f"{refused}: {os.strerror(number)}") from None
+    address = ipaddress.ip_address(found.getsockname()[0])
+    if address.is_multicast or str(address) == BROADCAST:
+        found.close()
+        raise none_of_ours
+    # `0` and `0x0` are names of every address, too.
+    return Listener(str(address) if address.is_unspecified else host, found)
 
 
 class PanelServer:

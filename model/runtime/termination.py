@@ -17,6 +17,10 @@ from .whole_file import unfinished
 
 CODES = {signal.SIGINT: (130, "interrupted"), signal.SIGTERM: (143, "terminated")}
 """The exit code after every signal that is handled, and the word for it."""
+HANGUP = getattr(signal, "SIGHUP", None)
+"""The signal of a terminal that is closed, where there is one; under nohup it stays ignored."""
+if HANGUP is not None:
+    CODES[HANGUP] = (129, "the terminal was closed")
 GRACE_S = 1.0
 """The time for what is printed to go out."""
 UNDO_S = 10.0
@@ -101,7 +105,8 @@ def hear_signals() -> None:
     os.set_blocking(told, False)
     signal.set_wakeup_fd(told, warn_on_full_buffer=False)
     for number in CODES:
-        signal.signal(number, lambda number, _: _end(number))
+        if number != HANGUP or signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, lambda number, _: _end(number))
     threading.Thread(target=_hear, args=[heard], daemon=True).start()
 
 

@@ -1,9 +1,13 @@
 """The commands that speak to a board, as they are called, with a board in simulation."""
 
+import errno
 import json
+import os
+import re
 import signal
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +17,7 @@ from hardwall.host.connect import connect
 from hardwall.host.errors import HostError
 from hardwall.host.status import State
 from hardwall.model.axis.registers import RegisterMap
+from hardwall.model.runtime.termination import CODES
 from hardwall.sim.scene.load import load
 from support.command_line import call
 from support.processes import HARDWALL, ended, started, wait_until
@@ -42,6 +47,14 @@ class Called(NamedTuple):
 def called(monkeypatch, capsys) -> Callable[..., Called]:
     """Return what calls a command in this process: a process of its own would take a second to begin."""
     return lambda *words: Called(*call(monkeypatch, capsys, *words, *AT))
+
+
+@pytest.fixture
+def hangup_is_heard() -> Iterator[None]:
+    """Let programs that are started hear SIGHUP, though the tests run under nohup."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
 
 
 def state_of(board: VirtualBoard) -> State | None:
@@ -78,16 +91,17 @@ def test_set_writes_and_says_what_is_used(virtual, called):
     assert used["wall_stiffness"] == pytest.approx(1000, abs=REGISTERS["wall_stiffness"].lsb)
 
 
-def test_arm_lasts_as_long_as_its_command(virtual, called):
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_arm_lasts_as_long_as_its_command(virtual, called, hangup_is_heard, number):
     with started(HARDWALL, "arm", virtual.path, "--acknowledge", *AT) as process:
         assert process.stdout.readline().startswith("ARMED ")
         # Another host cannot have the port meanwhile.
         busy = called("disarm", virtual.path)
         assert busy.returncode == 1
         assert "another program has it, and a board has one host at a time" in busy.stderr
-        process.send_signal(signal.SIGINT)
+        process.send_signal(signal.Signals[number])
         code, _, err = ended(process)
-    assert code == 130, err
+    assert code == CODES[signal.Signals[number]][0], err
     assert state_of(virtual) is State.DISARMED
 
 
@@ -166,6 +180,8 @@ def test_watch_shows_a_line_and_home_finds_the_index(virtual, called):
         (["watch", "PORT", "--seconds", "inf"], 2, "--seconds must be 0 to 1e+06 s, not inf"),
         (["capture", "PORT", "--trigger", "contact,noise"], 2, "--trigger must be of contact, trip, rise, fall, hand,"),
         (["capture", "PORT", "--before", "3000"], 2, "before must be 0 to 2047, not 3000"),
+        (["capture", "PORT", "--last", "--arm"], 2, "--last reads what is there: it goes with no word, --arm, "),
+        (["capture", "PORT", "--last", "--trigger", "trip"], 2, "--last reads what is there: it goes with no word, "),
         (["capture", "PORT", "-o", "hit.csv"], 2, "--out must end in .npz, not 'hit.csv'"),
         (["connect", "PORT", "--identity", "no"], 1, "it has another bitstream"),
         (["connect", "/dev/hardwall-absent"], 1, "cannot be opened: there is none of that name"),
@@ -219,3 +235,27 @@ def test_a_capture_by_hand_and_one_that_does_not_come(virtual, called):
     done = called("capture", virtual.path, "--trigger", "trip", "--before", "0", "--seconds", "2")
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == "hardwall: error: the capture is not DONE in 2 s: it is WAITING"
+
+
+def test_a_capture_whose_file_cannot_be_written_is_read_again(virtual, called, monkeypatch, tmp_path):
+    def full(path: Path, content: bytes) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as context:
+        context.setattr(Path, "write_bytes", full)
+        lost = called("capture", virtual.path, "--trigger", "hand", "--before", "7", "--json", "-o", tmp_path / "a.npz")
+    assert lost.returncode == 1
+    said = f"; the board keeps the capture: `hardwall capture {virtual.path} --last` reads it again\n"
+    assert lost.stderr.endswith(f"a.npz: cannot be written (No space left on device){said}")
+    again = called("capture", virtual.path, "--last", "--json", "-o", tmp_path / "b.npz")
+    assert (again.returncode, again.stdout) == (0, lost.stdout)
+    with np.load(tmp_path / "b.npz") as saved:
+        assert saved["place"] == json.loads(lost.stdout)["before"] == 7
+
+
+def test_there_may_be_no_last_capture(virtual, called):
+    with connect(virtual.path, pace=PACE) as axis:
+        axis.capture.start(["trip"])
+    done = called("capture", virtual.path, "--last")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert re.fullmatch("hardwall: error: the capture is (FILLING|WAITING): wait until it is DONE\n", done.stderr)

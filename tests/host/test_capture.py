@@ -51,6 +51,13 @@ def test_who_reads_a_capture_lives(board, axis, registers, monkeypatch):
     assert len(set(renewed)) == -(-registers.capture.records // PART_RECORDS)
 
 
+def test_who_has_no_lease_may_read_a_capture(board, axis, registers):
+    hold(board, records(registers, 1))
+    before = dict(board.server.file.active)
+    assert len(axis.capture.read(lives=False).time_s) == registers.capture.records
+    assert board.server.file.active == before
+
+
 def test_a_capture_can_be_saved(board, axis, registers, tmp_path):
     hold(board, records(registers, 1))
     found = axis.capture.read()

@@ -5,6 +5,8 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 
 import pytest
 
@@ -65,20 +67,48 @@ def test_no_watchdog_lasts_longer_than_the_lease(registers):
     assert watchdog.high * watchdog.lsb <= HOLD_S
 
 
-def test_a_program_has_the_name_of_its_process():
-    program = "import socket, sys; line = socket.create_connection(('127.0.0.1', int(sys.argv[1]))); sys.stdin.read()"
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        words = [sys.executable, "-c", program, str(listener.getsockname()[1])]
-        with subprocess.Popen(words, stdin=subprocess.PIPE) as process:
-            line, peer = listener.accept()
-            with line:
-                assert name_of(peer).endswith(f", process {process.pid}")
-            process.stdin.close()
-    with socket.create_server(("127.0.0.1", 0)) as listener, socket.create_connection(listener.getsockname()):
+PROGRAM = (
+    "import socket, sys; host, port, own, number = sys.argv[1:]; "
+    "line = socket.create_connection((host, int(port)), source_address=(own, int(number))); sys.stdin.read()"
+)
+
+
+@contextmanager
+def program_at(listener: socket.socket, own: str = "127.0.0.1", number: int = 0) -> Iterator[Callable[[], bool]]:
+    """Let a process connect from an address; yield what returns whether its name has its number."""
+    host, port = listener.getsockname()
+    words = [sys.executable, "-c", PROGRAM, host, str(port), own, str(number)]
+    with subprocess.Popen(words, stdin=subprocess.PIPE) as process:
         line, peer = listener.accept()
         with line:
-            assert name_of(peer).endswith(f", process {os.getpid()}")
+            yield lambda: name_of(peer, line.getsockname()).endswith(f", process {process.pid}")
+        process.stdin.close()
+
+
+def test_a_program_has_the_name_of_its_process():
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        with program_at(listener) as is_named:
+            assert is_named()
+        with socket.create_connection(listener.getsockname()):
+            line, peer = listener.accept()
+            with line:
+                assert name_of(peer, line.getsockname()).endswith(f", process {os.getpid()}")
+
+
+def test_a_program_is_not_taken_for_one_with_the_same_port():
+    with ExitStack() as stack:
+        listeners = [stack.enter_context(socket.create_server((host, 0))) for host in ("127.0.0.1", "127.0.0.2")]
+        number = free_port()
+        # The same number of a port at two addresses, and at one address with two others.
+        places = [(listeners[0], "127.0.0.1"), (listeners[0], "127.0.0.2"), (listeners[1], "127.0.0.3")]
+        programs = [stack.enter_context(program_at(listener, own, number)) for listener, own in places]
+        assert [is_named() for is_named in programs] == [True, True, True]
+
+
+def free_port() -> int:
+    with socket.create_server(("0.0.0.0", 0)) as listener:
+        return listener.getsockname()[1]
 
 
 def test_a_program_that_is_not_found_has_its_address():
-    assert name_of(("127.0.0.1", 1)) == "a program at 127.0.0.1:1"
+    assert name_of(("127.0.0.1", 1), ("127.0.0.1", 2)) == "a program at 127.0.0.1:1"

@@ -214,6 +214,18 @@ def test_a_board_that_goes_away_is_gone_for_good(board, port):
         port.read(0, 2)
 
 
+def test_who_is_sent_away_is_told_so():
+    said = "ended the connection at once: it is no board, or has as many programs as it takes"
+
+    def send_away(server: socket.socket) -> None:
+        server.accept()[0].close()
+
+    with socket.create_server(("127.0.0.1", 0)) as server, ThreadPoolExecutor(1) as thread:
+        thread.submit(send_away, server)
+        with pytest.raises(PortError, match=said):
+            Port(f"tcp://127.0.0.1:{server.getsockname()[1]}").read(0, 2)
+
+
 def test_what_does_not_repeat_is_no_axis():
     with socket.create_server(("127.0.0.1", 0)) as server:
 
@@ -283,7 +295,9 @@ def test_a_request_behind_the_close_is_an_error_of_the_port(port):
         ("tcp://127.0.0.1:\u0663", "a port of the network must be tcp://HOST:PORT"),
         ("tcp://:5", "a port of the network must be tcp://HOST:PORT"),
         ("tcp://127.0.0.1:65536", "a port of the network must be tcp://HOST:PORT"),
-        ("tcp://no.such.host.invalid:5", "cannot be opened"),
+        ("tcp://no.such.host.invalid:5", r"cannot be opened: [^[]*$"),
+        (f"tcp://{'a' * 300}:5", "cannot be opened: no machine has such a name$"),
+        ("tcp://[::1]:1", r"tcp://\[::1\]:1 cannot be opened: nothing listens there$"),
     ],
 )
 def test_a_port_that_cannot_be_had_says_why(name, message):

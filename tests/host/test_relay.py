@@ -1,8 +1,10 @@
 """A board that several programs share: all of them read, one writes, and each may disarm."""
 
+import errno
 import re
 import socket
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 
@@ -244,6 +246,57 @@ def test_whatever_is_sent_to_it_the_next_request_is_answered(board, relay):
             line.recv(1)
         line.settimeout(10.0)
         assert answered(line, READ_LAYOUT, 9) == expected
+
+
+def test_a_program_that_sends_no_requests_is_not_heard_for_a_while(relay):
+    """A flood of them takes no processor from the program that holds the lease."""
+    spoilt = [READ_LAYOUT[:-1] + b"\0", framed(bytes([2, 3, 0, 0, 0, 2]))]
+    with line_to(relay) as line:
+        answered(line, READ_LAYOUT, 9)
+        for other in spoilt:
+            began_s = time.monotonic()
+            answered(line, 2 * other + READ_LAYOUT, 9)
+            assert time.monotonic() - began_s >= 2 * relays.DEAF_S
+
+
+def test_a_program_that_sends_nothing_but_rubbish_is_left(relay, monkeypatch):
+    monkeypatch.setattr(relays, "DEAF_S", 0.0)
+    spoilt = READ_LAYOUT[:-1] + b"\0"
+    with line_to(relay) as line:
+        # Not in a row.
+        for _ in range(2):
+            answered(line, (relays.RUBBISH_MAX - 1) * spoilt + READ_LAYOUT, 9)
+        line.sendall(relays.RUBBISH_MAX * spoilt)
+        assert line.recv(1) == b""
+    wait_until(lambda: not relay._connections)
+
+
+@pytest.mark.parametrize("request_", [bytes([1, 8, 0, 0, 1, 2]), bytes([1, 0x2B, 14, 4, 0x80])])
+def test_what_is_not_of_the_board_is_answered_after_a_while(relay, request_):
+    with line_to(relay) as line:
+        answered(line, READ_LAYOUT, 9)
+        began_s = time.monotonic()
+        for _ in range(5):
+            answered(line, framed(request_), 8)
+        assert time.monotonic() - began_s >= 5 * relays.OWN_S
+
+
+def test_programs_come_again_when_there_are_files_again(relay, monkeypatch):
+    monkeypatch.setattr(relays, "REST_S", 0.05)
+    accept, refused = socket.socket.accept, threading.Event()
+
+    def refuse_once(listener: socket.socket) -> tuple[socket.socket, tuple[str, int]]:
+        if not refused.is_set():
+            refused.set()
+            raise OSError(errno.EMFILE, "Too many open files")
+        return accept(listener)
+
+    monkeypatch.setattr(socket.socket, "accept", refuse_once)
+    # The first one ends the call that waits already.
+    for _ in range(2):
+        with line_to(relay) as line:
+            assert answered(line, READ_LAYOUT, 9)[:2] == READ_LAYOUT[:2]
+    assert refused.is_set()
 
 
 @pytest.mark.parametrize("function", [6, 16, 23])

@@ -10,10 +10,12 @@ from hardwall.model.runtime import termination
 from support.processes import ended, ended_by, line, session, started, wait_until
 
 PROGRAM = """
-import sys, time
+import signal, sys, time
 from pathlib import Path
 from hardwall.model.runtime.whole_file import whole_file
 from hardwall.model.runtime import termination
+# As in a shell, or under nohup, whatever the tests run under.
+signal.signal(signal.SIGHUP, {hangup})
 termination.hear_signals()
 termination.go_on_by("--resume goes on from there")
 for _ in range({kept}):
@@ -28,14 +30,26 @@ with termination.undone(Path("outer").touch), termination.undone(lambda: Path("i
 
 
 @pytest.mark.parametrize("kept", [0, 1, 2])
-@pytest.mark.parametrize(("number", "code", "word"), [("SIGINT", 130, "interrupted"), ("SIGTERM", 143, "terminated")])
+@pytest.mark.parametrize(
+    ("number", "code", "word"),
+    [("SIGINT", 130, "interrupted"), ("SIGTERM", 143, "terminated"), ("SIGHUP", 129, "the terminal was closed")],
+)
 def test_a_signal_ends_the_program_in_a_line(tmp_path, monkeypatch, kept, number, code, word):
     monkeypatch.chdir(tmp_path)
-    with started(sys.executable, "-c", PROGRAM.format(kept=kept)) as process:
+    with started(sys.executable, "-c", PROGRAM.format(kept=kept, hangup="signal.SIG_DFL")) as process:
         wait_until((tmp_path / "ready").exists)
         process.send_signal(signal.Signals[number])
         assert ended(process) == (code, "finished", f"hardwall: error: {word}{REMARKS[kept]}\n")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["inner", "outer", "ready"]
+
+
+def test_under_nohup_a_terminal_that_is_closed_ends_nothing(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with started(sys.executable, "-c", PROGRAM.format(kept=0, hangup="signal.SIG_IGN")) as process:
+        wait_until((tmp_path / "ready").exists)
+        process.send_signal(signal.SIGHUP)
+        process.send_signal(signal.SIGTERM)
+        assert ended(process)[0] == 143
 
 
 REMARKS = {

@@ -133,7 +133,33 @@ def test_a_port_that_is_taken_is_one_line():
             listen(port=port)
 
 
-@pytest.mark.parametrize("host", ["nowhere.invalid", "192.0.2.1", "a" * 300])
+@pytest.mark.parametrize(
+    "host",
+    [
+        *("nowhere.invalid", "192.0.2.1", "a" * 300, "fe80::1"),
+        # The system takes these for every address, or for those of a group of machines.
+        *("", "<broadcast>", "255.255.255.255", "224.0.0.1", "ff02::1"),
+    ],
+)
 def test_an_address_that_is_none_is_one_line(host):
     with pytest.raises(AddressError, match=rf"^port 0 of {host} cannot be had: that is no address of this machine$"):
         listen(host)
+
+
+@pytest.mark.parametrize(
+    ("host", "shown"),
+    [
+        ("0", "0.0.0.0"),
+        ("0x0", "0.0.0.0"),
+        ("0.0.0.0", "0.0.0.0"),
+        ("localhost", "localhost"),
+        ("::1", "::1"),
+        ("::", "::"),
+    ],
+)
+def test_every_name_of_every_address_is_one_of_them(host, shown):
+    if ":" in host and not socket.has_dualstack_ipv6():
+        pytest.skip("this machine has no IPv6")
+    at = listen(host)
+    at.socket.close()
+    assert at.host == shown
