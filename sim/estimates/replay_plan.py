@@ -168,7 +168,8 @@ def plan(
     reference = zero_phase_velocity(position, rate, cutoff)
     bound = given
     if bound is None:
-        bound = max(acceleration_bound(reference, rate), least_acceleration(counts) * coarsen * rate**2)
+        largest = acceleration_bound(reference, rate, first_judged(recording))
+        bound = max(largest, least_acceleration(counts) * coarsen * rate**2)
     try:
         spec = axis_spec(counts, coarsen, bound / rate**2, estimator, time)
     except ValueError as error:

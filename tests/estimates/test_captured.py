@@ -118,6 +118,15 @@ def test_a_capture_shorter_than_a_second_is_judged_after_its_first_quarter():
     assert replay(recording(MADE), "fdm").judged_from == 375
 
 
+@pytest.mark.parametrize("seconds", [0.9, 1.1])
+def test_the_bound_of_a_capture_is_that_of_its_judged_samples(seconds):
+    """The swing accelerates most at its turn, at 0.71 s: a bound from what follows the first second is too small."""
+    made = recording(swing(seconds, 5000.0, 0.7), seconds=seconds)
+    found = replay(made, "fdm")
+    acceleration = np.abs(np.gradient(found.reference_counts_per_s) * made.rate_hz)[found.judged_from :]
+    assert acceleration.max() <= found.acceleration_max_counts_per_s2 <= 1.1 * acceleration.max()
+
+
 def test_a_capture_without_edges_is_at_rest():
     none = EdgeRecord(1e6, np.zeros(0, np.int64), np.zeros(0, np.int64), 0)
     found = replay(Recording("made.sr", "A,B", np.zeros(500, int), 1000.0, edges=none), "period")
