@@ -13,6 +13,7 @@ import numpy as np
 from ...model.checks import shown
 from .error import RecordingError, plain
 from .stamps import decimal_of
+from .steps import SPAN_BITS
 from .table import Cells, Table
 
 COUNT_BITS = 62
@@ -37,6 +38,15 @@ def size_of(text: str) -> float | None:
     except (ValueError, ZeroDivisionError):
         return None
     return size if 0 < size < math.inf else None
+
+
+def turn_of(unit: str, size: float | None) -> int | None:
+    """Return the counts of one turn; None for a unit without turns, or a size that does not divide a turn."""
+    if unit not in TURN or size is None:
+        return None
+    parts = TURN[unit] / size
+    whole = parts < 1 << SPAN_BITS and abs(parts - round(parts)) <= OFF_MAX
+    return round(parts) if whole and round(parts) > 1 else None
 
 
 class Counts:

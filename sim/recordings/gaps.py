@@ -37,9 +37,9 @@ class Grid(NamedTuple):
     notes: list[str]
 
     @property
-    def gaps(self) -> np.ndarray:
-        """For every step from a row to the next, whether samples are missing between them."""
-        return np.diff(self.numbers) > 1
+    def passed(self) -> np.ndarray:
+        """How many intervals of a sample it is from every row to the next: more than 1 where samples are missing."""
+        return np.diff(self.numbers)
 
 
 def whole(length: int) -> Grid:
@@ -85,7 +85,7 @@ def grid_of(name: str, since: np.ndarray, counts: np.ndarray, rule: str) -> Grid
 
 def _longest(grid: Grid) -> Grid:
     """Return the longest piece of a grid between two gaps."""
-    return piece(grid, np.flatnonzero(grid.gaps) + 1)
+    return piece(grid, np.flatnonzero(grid.passed > 1) + 1)
 
 
 def piece(grid: Grid, cuts: np.ndarray) -> Grid:

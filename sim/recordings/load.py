@@ -9,7 +9,7 @@ import numpy as np
 from ...model.checks import shown
 from . import gaps
 from .capture import Capture
-from .counts import Counts
+from .counts import Counts, turn_of
 from .decoded import recording_of
 from .error import RecordingError, plain
 from .forms import source_of
@@ -102,8 +102,9 @@ class _Counted:
         return Recording(self._path, column, counts, rate_hz, start_s, notes=tuple(notes))
 
     def _unwrapped(self, lines: np.ndarray, counts: np.ndarray, grid: gaps.Grid) -> Unwrapped:
-        steps = Steps(self._table, self._column, lines[grid.rows], counts[grid.rows], grid.gaps)
-        return steps.unwrapped(self._reading.counter_bits, self._reading.gaps != "refuse")
+        reading, turn = self._reading, turn_of(self._reading.unit, self._reading.count)
+        steps = Steps(self._table, self._column, lines[grid.rows], counts[grid.rows], grid.passed, turn)
+        return steps.unwrapped(reading.counter_bits, reading.gaps != "refuse")
 
     def _read(self) -> tuple[np.ndarray, Counts, Stamps | None]:
         """Return the lines, the counts and the times of all rows."""
