@@ -72,8 +72,10 @@ class _Counted:
         self._table, self._path, self._column, self._given, self._reading = table, path, column, rate_hz, reading
         self._place = table.place(column)
         self._time = time_column_of(table, reading, {self._place})
-        # The times of a column that was not asked for only have to agree with a rate that is given.
-        self._loose = rate_hz is not None and self._time is not None and not self._time.meant
+        # The times of a column that was not asked for only have to agree with a rate that is given, unless they are to
+        # tell where samples are missing.
+        asked = reading.gaps != "refuse" or (self._time is not None and self._time.meant)
+        self._loose = rate_hz is not None and self._time is not None and not asked
         if self._time is None and rate_hz is None:
             raise RecordingError(
                 f"{table.name}: there is no column {TIME_COLUMN}, so the rate in Hz must be given (--rate), "
@@ -88,7 +90,7 @@ class _Counted:
         grid, times, unit = gaps.whole(len(counts)), None, None
         if stamps is not None:
             times, unit = self._seconds(stamps)
-            grid = gaps.grid_of(table.name, times.since, counts, reading.gaps)
+            grid = gaps.grid_of(table.name, times, counts, reading.gaps, self._given)
         # A lost sample is an uneven time and a jump of the count: the time says which it is.
         rate_hz, start_s = self._rate(lines, grid, times)
         unwrapped = self._unwrapped(lines, counts, grid)

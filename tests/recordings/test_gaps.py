@@ -1,5 +1,7 @@
 """Missing and repeated samples: refused, held, or the longest piece; and a sensor that stood."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -83,3 +85,45 @@ def test_nothing_to_mend_changes_nothing(read):
     lines = [f"{k / 1000:.3f},{count}" for k, count in enumerate(COUNTS)]
     for rule in gaps.RULES:
         assert (read(lines, gaps=rule).counts == COUNTS).all()
+
+
+@pytest.mark.parametrize("header", ["time", "t_ms", "clock"])
+def test_times_of_any_name_tell_where_samples_are_missing_beside_a_rate(read, header):
+    """With a rate, times that were not asked for were passed over, and with them the gaps."""
+    unit = 1000 if "ms" in header else 1
+    lines = [f"{k / 1000 * unit:.3f},{SWING[k]}" for k in LOST]
+    held = read(lines, rate_hz=1000, header=f"{header},counts", gaps="hold")
+    assert (np.flatnonzero(held.counts != SWING) == sorted(set(range(1000)) - set(LOST))).all()
+    found = read(lines, rate_hz=1000, header=f"{header},counts", gaps="split")
+    assert (found.counts == SWING[310:700]).all()
+
+
+# ---- stamps as coarse as the interval --------------------------------------------------------------------------------
+
+
+def coarse(rate_hz, kept=range(1000)):
+    return [f"{k / rate_hz:.3f},{k}" for k in kept]
+
+
+@pytest.mark.parametrize("rate", [550, 700, 900, 990])
+@pytest.mark.parametrize("rule", ["hold", "split"])
+def test_rounded_stamps_are_no_gaps(read, refused, rate, rule):
+    """Of stamps in ms, 1 ms is usual and 2 ms frequent: 700 Hz was made into 1 kHz, two samples of five held."""
+    for kept in (range(1000), [*range(400), *range(410, 1000)]):
+        found = read(coarse(rate, kept), rate_hz=rate, gaps=rule)
+        assert found.rate_hz == rate
+        assert len(found.counts) == (590 if rule == "split" and len(kept) < 1000 else 1000)
+        assert found.counts[-1] == 999
+        if rate < 990:  # else a piece has too few to tell
+            assert re.search(r"give the rate \(--rate [5-9]\d\d(\.\d+)?\), for", refused(coarse(rate, kept), gaps=rule))
+
+
+@pytest.mark.parametrize("lost", [1, 20])
+def test_single_samples_that_are_lost_are_held_at_any_resolution(read, refused, lost):
+    """At 1 kHz in ms, a lost sample makes one interval of two units."""
+    without = np.sort(np.random.default_rng(7).choice(np.arange(1, 999, 2), lost, replace=False))
+    kept = [k for k in range(1000) if k not in without]
+    for rate in (None, 1000):
+        found = read(coarse(1000, kept), rate_hz=rate, gaps="hold")
+        assert (found.counts == [k if k in kept else k - 1 for k in range(1000)]).all()
+    assert "(--gaps hold)" in refused(coarse(1000, kept), rate_hz=1000)

@@ -1,5 +1,7 @@
 """Times as files give them: exact decimals, float64 printed in full, ISO timestamps, and units."""
 
+import io
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,12 @@ from hardwall.sim.recordings.table import Arrays
 from stimuli.forms import COUNTS, angles, rows
 
 TABLE = Arrays("made.npz", "arrays", {"t": np.zeros(2)})
+
+
+def npz(**arrays):
+    file = io.BytesIO()
+    np.savez(file, **arrays)
+    return file.getvalue()
 
 
 def whole(cells, unit="s"):
@@ -95,4 +103,31 @@ def test_a_time_that_is_none_is_refused(refused):
     assert "line 9, column time_s: a time must be a number of seconds of -1e+12 to 1e+12, not '0.0x7'" in refused(lines)
     assert "column t: a time must be a number of ms of" in refused(
         ["0,1", "x,2"], header="t,counts", time="t", time_unit="ms"
+    )
+
+
+@pytest.mark.parametrize("text", ["9500000000000000000", "9.5e18", "-9500000000000000000", "930000000000000000000.5"])
+def test_nanoseconds_beyond_64_bits_are_refused(refused, text):
+    """They ended in a traceback."""
+    said = "line 2, column time: a time must be a number of ns of -9e+18 to 9e+18, not"
+    assert said in refused([f"{text},1", f"{text},2"], header="time,counts", time_unit="ns")
+
+
+def test_whole_nanoseconds_of_arrays_reach_as_far_as_those_of_texts(read, refused):
+    """Those since 1970 are beyond 1e18, which was the limit."""
+    for start in (1_700_000_000_000_000_000, 8_900_000_000_000_000_000):
+        times = start + np.arange(500) * 1_000_000
+        for kind in (np.int64, np.uint64):
+            found = read(npz(t=times.astype(kind), counts=COUNTS), file="spindle.npz", time_unit="ns")
+            assert (found.rate_hz, found.start_s) == (1000.0, start / 1e9)
+    beyond = np.uint64(9_500_000_000_000_000_000) + np.arange(500).astype(np.uint64)
+    said = "row 1, column t: a time must be a number of ns of -9e+18 to 9e+18, not '9500000000000000000'"
+    assert said in refused(npz(t=beyond, counts=COUNTS), file="spindle.npz", time_unit="ns")
+
+
+def test_timestamps_beyond_nanoseconds_of_64_bits_are_refused(refused):
+    """They wrapped, to a time of another century."""
+    times = np.arange(500).astype("datetime64[s]") + 10**13
+    assert "row 1, column t: a time must be as 2024-05-01T12:00:00.123, not '318857-" in refused(
+        npz(t=times, counts=COUNTS), file="spindle.npz"
     )
