@@ -180,7 +180,13 @@ def plan(
         raise ArgumentError("settings", f"must give an axis ({time.said}): {error}") from None
     if whole is not None and needs_pins(estimator, backend):
         edges = coarse(whole, coarsen)
-        spec = with_clock(spec, edges, rate)
+        try:
+            spec = with_clock(spec, edges, rate)
+        except ValueError as error:
+            raise ReplayError(
+                f"{recording.file}, column {recording.column}: {estimator} cannot take this capture at {rate:g} Hz, "
+                f"for a sample has too many ticks of the capture ({time.said}: {error}): give a higher rate (--rate)"
+            ) from None
     return Plan(counts, cutoff, reference, bound, spec, edges)
 
 

@@ -69,6 +69,9 @@ class Counts:
         Raises:
             RecordingError: if a cell is no count, or no number.
         """
+        if isinstance(cells, np.ndarray) and cells.dtype.kind in "Mm":
+            what = "counts" if self._unit == "counts" else f"values in {self._unit}"
+            raise RecordingError(f"{self._table.name}, column {plain(self._column)}: must have {what}, not times")
         if self._unit == "counts":
             self._parts.append(self._counts(lines, cells))
             return
@@ -128,7 +131,7 @@ class Counts:
         if number is not None and number.is_finite() and number != 0:
             if number.adjusted() < 18:
                 cure = ": for an angle or a length, say its unit and the size of a count (--unit, --count)"
-            elif number.adjusted() < 20:
+            elif number.adjusted() < 20 and not self._wide:
                 cure = ": for a counter of 64 bits, say so (--counter-bits 64)"
         return RecordingError(f"{self._where(line)}: {WHOLE_COUNT}, not {shown(text)}{cure}")
 

@@ -3,6 +3,7 @@
 A row is a sample or a change of levels. Without times, rows are samples at the rate that a comment of the file states.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,6 +17,8 @@ from .time_column import place_of, time_column_of
 
 DECIMALS_MAX = 12
 """The most decimal places of a second that are kept: picoseconds."""
+TICK_DIGITS = 18
+"""The digits of a tick, which fit int64."""
 
 
 class LogicTable(Capture):
@@ -103,6 +106,8 @@ class LogicTable(Capture):
         if (np.diff(times.since[:-1]) <= 0).any() or times.since[-1] < times.since[-2]:
             raise RecordingError(f"{where}: times must increase from one change of levels to the next")
         decimals = DECIMALS_MAX if times.decimals is None else min(max(times.decimals, 0), DECIMALS_MAX)
+        # Ticks of a long capture must fit int64; a float64 has fewer digits than that.
+        decimals = min(decimals, TICK_DIGITS - math.ceil(math.log10(max(times.since[-1], 1.0))))
         ticks = np.rint(times.since * 10.0**decimals).astype(np.int64)
         return Changes(10.0**decimals, ticks[1:-1], levels, start, int(ticks[-1]), float(times.first))
 

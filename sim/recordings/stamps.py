@@ -99,8 +99,9 @@ class Stamps:
         return min(TIME_MAX_S * 10.0 ** -UNITS.get(self.unit or "ns", 0), TIME_MAX)
 
     def _add_numbers(self, lines: Sequence[int], cells: np.ndarray) -> None:
-        if cells.dtype.kind == "M":
-            self.unit, exact = "iso", cells.astype("datetime64[ns]")
+        if cells.dtype.kind in "Mm":
+            self.unit = "iso" if cells.dtype.kind == "M" else "s"
+            exact = cells.astype(f"{cells.dtype.kind}8[ns]")
             wrong = np.isnat(cells) | (exact.astype(cells.dtype) != cells)
             self._parts.append((exact.view(np.int64).copy(), -9))
         elif self.unit == "iso":

@@ -111,10 +111,13 @@ class Steps:
         if bits is not None:
             self._check_width(bits, steps, wraps)
         cuts = self._check(steps, may_stand)
-        first = int(self._counts[0])
-        counts = np.concatenate([[0], np.cumsum(steps)]) + (first if abs(first) <= LARGEST else 0)
-        if abs(float(np.sum(steps, dtype=np.float64))) >= LARGEST or np.abs(counts).max() > 2 * LARGEST:
+        if np.abs(np.cumsum(steps, dtype=np.float64)).max() >= LARGEST:
             raise RecordingError(f"{self._where(0)}: counts must stay within 2**61 of the first, unwrapped")
+        counts, first = np.concatenate([[0], np.cumsum(steps)]), int(self._counts[0])
+        if first + int(counts.min()) >= -LARGEST and first + int(counts.max()) < LARGEST:
+            counts += first
+        else:
+            notes.append(f"counted from the first, {first}")
         return Unwrapped(counts, cuts, notes)
 
     def _check_span(self, bits: int | None) -> None:

@@ -1,5 +1,7 @@
 """Captures through an axis: the words of every backend, the clock, the reference, and what stamps are worth."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -146,3 +148,12 @@ def test_slow_edges_are_a_motion_at_any_rate(estimator, rate_hz):
         # Half an LSB, and two edges that are each a sample late at most.
         lsb = seen.spec.design.estimator.velocity.lsb * rate_hz
         assert np.abs(judged - 4.0).max() <= 0.5 * lsb + 4.0 * 2 * 4.0 / rate_hz
+
+
+def test_a_rate_too_low_for_the_ticks_of_a_capture_is_refused_by_the_file():
+    """The message named a rate of the scene, which a replay does not have."""
+    edges = EdgeRecord(1e9, np.arange(1, 40) * 10**8, np.arange(1, 40), 0)
+    with pytest.raises(ReplayError) as error:
+        replay(recording(edges, 0.5, 8.0), "period")
+    said = r"made\.sr, column A,B: period cannot take this capture at 0\.5 Hz, for a sample has too many ticks .*: "
+    assert re.fullmatch(said + r"give a higher rate \(--rate\)", str(error.value))

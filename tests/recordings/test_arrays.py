@@ -130,3 +130,32 @@ def test_archives_of_other_files_are_refused(refused):
         with zipfile.ZipFile(file, "w") as archive:
             archive.writestr(member, "1")
         assert said in refused(file.getvalue(), file="spindle.zip")
+
+
+def npy(array):
+    file = io.BytesIO()
+    np.save(file, array)
+    return file.getvalue()
+
+
+@pytest.mark.parametrize("shape", [(), (3, 4, 5), (1, 1, 1, 1)])
+def test_an_array_of_other_dimensions_is_refused(refused, shape):
+    said = refused(npy(np.zeros(shape)), "1", rate_hz=1000, file="spindle.npy")
+    assert said.endswith(f"must be an array of 1 or 2 dimensions, not {len(shape)}")
+
+
+@pytest.mark.parametrize("kind", ["datetime64[ms]", "timedelta64[ns]", "timedelta64[us]"])
+@pytest.mark.parametrize(("unit", "what"), [("counts", "counts"), ("rad", "values in rad")])
+def test_times_are_no_counts(refused, kind, unit, what):
+    content = npz(counts=np.arange(10).astype(kind))
+    size = {"count": 0.1} if unit == "rad" else {}
+    said = refused(content, rate_hz=1000, file="spindle.npz", unit=unit, **size)
+    assert said.endswith(f"column counts: must have {what}, not times")
+
+
+@pytest.mark.parametrize("kind", ["ns", "us", "ms"])
+def test_durations_are_times(read, kind):
+    times = (np.arange(500) * np.timedelta64(1, "ms")).astype(f"timedelta64[{kind}]")
+    found = read(npz(time_ms=times, counts=COUNTS), file="spindle.npz")
+    assert found.rate_hz == 1000.0
+    assert "times in column time_ms (s), 1000 Hz" in found.notes

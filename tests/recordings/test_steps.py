@@ -151,6 +151,25 @@ def test_a_width_that_is_given_is_used(read, refused, bits):
     assert f"a counter of {bits} bits that wrapped" in found.notes[-1]
 
 
+@pytest.mark.parametrize("first", [2**61 - 5, 2**61, 2**62, 2**63 - 5, -(2**61) + 5, -(2**63)])
+@pytest.mark.parametrize("step", [1, -1])
+def test_counts_of_64_bits_keep_their_origin_where_a_count_may_lie(read, first, step):
+    """What a count may be, a replay takes; a counter of 64 bits that is elsewhere is counted from its first value."""
+    exact = [first + step * k for k in range(10)]
+    wrapped = [(count + 2**63) % 2**64 - 2**63 for count in exact]
+    found = read("counts\n" + "".join(f"{count}\n" for count in wrapped), rate_hz=1000, counter_bits=64)
+    kept = all(-(2**61) <= count < 2**61 for count in exact)
+    assert found.counts.tolist() == [count - (0 if kept else first) for count in exact]
+    assert (f"counted from the first, {first}" in found.notes) != kept
+
+
+def test_counts_that_leave_their_first_by_more_than_61_bits_are_refused(refused):
+    there = "".join(f"{k << 60}\n" for k in (0, 1, 2, 1, 0))
+    assert "line 2, column counts: counts must stay within 2**61 of the first, unwrapped" in refused(
+        f"counts\n{there}", rate_hz=1000, counter_bits=64
+    )
+
+
 def test_counts_beyond_the_range_of_their_counter_are_refused(refused):
     said = refused("counts\n-1\n0\n255\n", rate_hz=1, counter_bits=8)
     assert "line 4, column counts: counts must span less than 2**8, not 256 up to here: give a larger" in said
