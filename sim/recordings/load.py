@@ -8,7 +8,6 @@ import numpy as np
 
 from ...model.checks import shown
 from . import gaps
-from .capture import Capture
 from .counts import Counts, turn_of
 from .decoded import recording_of
 from .error import RecordingError, plain
@@ -55,14 +54,10 @@ def load(
         source = LogicTable(source, reading)
     elif column is not None:
         raise RecordingError(f"{name}: is a capture of edges, which has no column: name its channels (--channels)")
-    return _captured(source, str(path), rate_hz, reading)
-
-
-def _captured(capture: Capture, path: str, rate_hz: float | None, reading: Reading) -> Recording:
-    """Return the recording of a capture."""
-    if reading.unit != "counts" or reading.counter_bits is not None:
-        raise RecordingError(f"{capture.name}: is a capture of edges, so --unit and --counter-bits must be absent")
-    return recording_of(capture, path, reading.channels, rate_hz)
+    else:
+        reading.refuse(name, "is a capture with times of its own", "time", "time_unit")
+    reading.refuse(name, "is a capture of edges", "unit", "count", "counter_bits", "gaps")
+    return recording_of(source, str(path), reading.channels, rate_hz)
 
 
 class _Counted:
@@ -72,6 +67,9 @@ class _Counted:
         self._table, self._path, self._column, self._given, self._reading = table, path, column, rate_hz, reading
         self._place = table.place(column)
         self._time = time_column_of(table, reading, {self._place})
+        reading.refuse(table.name, "is read as counts (--column)", "channels")
+        if self._time is None:
+            reading.refuse(table.name, "is read without times", "time_unit")
         # The times of a column that was not asked for only have to agree with a rate that is given, unless they are to
         # tell where samples are missing.
         asked = reading.gaps != "refuse" or (self._time is not None and self._time.meant)
@@ -146,6 +144,7 @@ class _Counted:
     def _seconds(self, stamps: Stamps) -> tuple[Times, str]:
         """Return the times in seconds, and their unit."""
         times = stamps.whole()
+        stamps.check_unit(self._reading.time_unit)
         if stamps.unit == "iso":
             return times, "ISO timestamps"
         where = place_of(self._table.name, self._time.name)

@@ -42,6 +42,9 @@ class LogicTable(Capture):
             raise RecordingError(
                 f"{table.name}: a capture must have times (--time COLUMN), or state its sample rate{self.otherwise}"
             )
+        if self._time is None:
+            reading.refuse(table.name, "is read without times", "time_unit")
+        self._given = reading.time_unit
         self._places = [place for place in range(table.width) if self._time is None or place != self._time.place]
         self.channels = [table.called(place) for place in self._places]
 
@@ -97,6 +100,7 @@ class LogicTable(Capture):
     def _timed(self, stamps: Stamps, levels: np.ndarray, start: int) -> Changes:
         """Return the changes with their times; the first time is that of the first row, the last of the last."""
         times, where = stamps.whole(), place_of(self.name, self._time.name)
+        stamps.check_unit(self._given)
         unit = stamps.unit if stamps.unit != "iso" else "s"
         if unit is None and times.decimals is not None and times.decimals > 0:
             unit = "s"

@@ -151,6 +151,12 @@ class Stamps:
             f"{where}: a time must be a number of {unit} of {-self._most:g} to {self._most:g}, not {shown(text)}"
         )
 
+    def check_unit(self, given: str | None) -> None:
+        """Raise RecordingError if times that have a unit of their own, those of NumPy, are to have another one."""
+        if given is not None and self.unit != given:
+            where = f"{self._table.name}, column {plain(self._column)}"
+            raise RecordingError(f"{where}: its times have a unit, so --time-unit must be absent, not {given}")
+
     def whole(self) -> "Times":
         """Return all the times."""
         if self._floats:

@@ -170,6 +170,17 @@ def test_samples_and_bytes_are_bounded(refused, monkeypatch):
     assert "cannot be read (it has more than 2e-05 MB of text)" in refused(GOOD)
 
 
+def test_what_a_file_has_no_use_for_is_refused(refused):
+    """Such options were taken, and changed nothing."""
+    assert refused(GOOD, channels=("A", "B")).endswith("is read as counts (--column), so --channels must be absent")
+    for content in ("counts\n1\n2\n", "time_s,counts\n0,1\n1,2\n"):
+        said = refused(content, rate_hz=1, time="none", time_unit="ms")
+        assert said.endswith("is read without times, so --time-unit must be absent")
+    levels = "; Samplerate: 1 MHz\nA,B\n0,0\n1,0\n"
+    assert refused(levels, None, 1.0, time_unit="s").endswith("is read without times, so --time-unit must be absent")
+    assert refused(levels, None, 1.0, gaps="hold").endswith("is a capture of edges, so --gaps must be absent")
+
+
 @pytest.mark.parametrize("name", ["davinci_L2_02.csv", "davinci_L2_22.csv", "davinci_R5_42.csv"])
 def test_the_recordings_are_read(recordings, name):
     path = recordings / name

@@ -131,3 +131,24 @@ def test_timestamps_beyond_nanoseconds_of_64_bits_are_refused(refused):
     assert "row 1, column t: a time must be as 2024-05-01T12:00:00.123, not '318857-" in refused(
         npz(t=times, counts=COUNTS), file="spindle.npz"
     )
+
+
+@pytest.mark.parametrize("kind", [float, int])
+def test_numbers_are_no_timestamps(refused, kind):
+    """With the unit of timestamps they were taken for seconds."""
+    times = (np.arange(500) + 3).astype(kind)
+    said = "row 1, column t: a time must be as 2024-05-01T12:00:00.123, not '3"
+    assert said in refused(npz(t=times, counts=COUNTS), file="spindle.npz", time_unit="iso")
+
+
+@pytest.mark.parametrize(("kind", "own"), [("datetime64[ms]", "iso"), ("timedelta64[ms]", "s")])
+@pytest.mark.parametrize("capture", [False, True])
+def test_times_with_a_unit_of_their_own_have_no_other(read, refused, kind, own, capture):
+    number = np.arange(500)
+    columns = {"A": number // 2 % 2, "B": (number + 1) // 2 % 2} if capture else {"counts": COUNTS}
+    how = {"column": None if capture else "counts", "rate_hz": 1000.0, "file": "spindle.npz", "time": "t"}
+    content = npz(t=number.astype(kind), **columns)
+    assert "column t: its times have a unit, so --time-unit must be absent, not ms" in refused(
+        content, time_unit="ms", **how
+    )
+    assert read(content, time_unit=own, **how).rate_hz == 1000.0
