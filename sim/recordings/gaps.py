@@ -1,10 +1,10 @@
 """Samples that are missing in a recording, and samples that are in it twice.
 
-An interval of `USUAL` usual ones or more is a gap. As many samples are missing as bring the pieces on either side into
-one line, each by the mean of its times. Stamps that are rounded to a unit give intervals of two lengths, one unit
-apart. So an interval that is longer by less than `UNITS` units is a gap only if the rate that is given says so; without
-a rate, unless there are `MANY` of them, spread as evenly as rounding does. A sample is repeated if its time and its
-count are those of the sample before. The rules:
+An interval that is nearer to two usual ones, or more, than to one is a gap; what is less is jitter. As many samples are
+missing as bring the pieces on either side into one line, each by the mean of its times. Stamps that are rounded to a
+unit give intervals of two lengths, one unit apart. So an interval that is longer by less than `UNITS` units is a gap
+only if the rate that is given says so; without a rate, unless there are `MANY` of them, spread as evenly as rounding
+does. A sample is repeated if its time and its count are those of the sample before. The rules:
 
 - `refuse`: either is an error.
 - `hold`: a gap is filled with the count before it, as a controller sees it; repeated samples are taken out.
@@ -23,8 +23,6 @@ from .recording import SAMPLES_MAX
 from .stamps import Times
 
 RULES = ("refuse", "hold", "split")
-USUAL = 1.5
-"""From how many usual intervals on one may lack a sample; what is less is jitter."""
 UNITS = 2
 """By how many units of a time stamp a gap is longer than the usual interval, beyond doubt."""
 MANY = 8
@@ -65,7 +63,7 @@ def passed_in(steps: np.ndarray, unit: float, rate_hz: float | None) -> np.ndarr
         rate_hz: the sample rate, in samples a unit of the intervals; None if it is not known.
     """
     usual = float(np.median(steps))
-    longer = steps >= USUAL * usual
+    longer = np.rint(steps / usual) > 1
     # A little less than so many units, for the rounding of the intervals.
     certain = longer & (steps - usual >= (UNITS - 1e-3) * unit)
     fewest, doubtful = _whole(steps, certain, rate_hz), np.count_nonzero(longer & ~certain)

@@ -92,11 +92,13 @@ class _Counted:
         # A lost sample is an uneven time and a jump of the count: the time says which it is.
         rate_hz, start_s = self._rate(lines, grid, times)
         unwrapped = self._unwrapped(lines, counts, grid)
+        counts = unwrapped.counts
         if reading.gaps == "split" and len(unwrapped.cuts):
-            grid = gaps.piece(grid, unwrapped.cuts)
+            longest = gaps.piece(grid, unwrapped.cuts)
+            counts = counts[np.searchsorted(grid.rows, longest.rows)]
+            grid = longest
             rate_hz, start_s = self._rate(lines, grid, times)
-            unwrapped = self._unwrapped(lines, counts, grid)
-        counts = gaps.held(unwrapped.counts, grid.numbers)
+        counts = gaps.held(counts, grid.numbers)
         notes = [table.form, *said, *self._said(rate_hz, unit), *unwrapped.notes, *grid.notes]
         column = table.called(self._place)
         return Recording(self._path, column, counts, rate_hz, start_s, notes=tuple(notes))

@@ -68,7 +68,7 @@ class Steps:
         lines: the line of every count in the file.
         counts: the counts as they are in the file, int64.
         passed: for every step, how many intervals of a sample it takes: more than 1 where samples are missing.
-        turn: counts of one turn, of angles; None for other values.
+        turn: counts of one turn, of angles; None for other values. Angles that span more have not wrapped at a turn.
     """
 
     def __init__(
@@ -81,9 +81,10 @@ class Steps:
         turn: int | None = None,
     ):
         self._table, self._column, self._lines, self._counts = table, column, lines, counts
-        self._passed, self._turn = passed, turn
+        self._passed = passed
         # A difference of two int64 that is not negative is exact as an unsigned number modulo 2**64.
         self._spread = np.maximum.accumulate(counts).view(np.uint64) - np.minimum.accumulate(counts).view(np.uint64)
+        self._turn = turn if turn is not None and self._spread[-1] <= turn else None
 
     def _where(self, sample: int) -> str:
         return f"{self._table.at(self._lines[sample])}, column {plain(self._column)}"
@@ -137,7 +138,7 @@ class Steps:
         if next(_jumps(steps, self._gaps), None) is None and not self._too_fast(steps).any():
             return None
         span = int(self._spread[-1])
-        sizes = [self._turn] if self._turn is not None and span <= self._turn else []
+        sizes = [] if self._turn is None else [self._turn]
         sizes += [1 << span.bit_length()] if span.bit_length() in WRAP_BITS else []
         return next((size for size in sizes if self._explains(size, steps)), None)
 

@@ -55,6 +55,16 @@ def test_counts_at_the_strobes_are_the_recorded_counts():
     assert replay(made, "fdm", backend="rtl").velocity_sha256 == replay(made, "fdm").velocity_sha256
 
 
+@pytest.mark.parametrize(("rate_hz", "sample", "tick"), [(1000.0, 2007, 2_007_000), (10_000.0, 51, 5100)])
+def test_an_edge_at_the_time_of_a_sample_is_seen_at_it(rate_hz, sample, tick):
+    """In float64 such an edge is a part in 10^16 late: a clock later, its sample would not see it."""
+    assert np.ceil(tick / 1e6 * rate_hz * 1024) > sample * 1024
+    edges = EdgeRecord(1e6, np.array([tick - 2 * 1_000_000 // int(rate_hz), tick]), np.array([1, 2]), 0)
+    made = Recording("made.sr", "A,B", counts_at(edges, rate_hz, sample + 40), rate_hz, edges=edges)
+    seen = replay(made, "period", acceleration_max_counts_per_s2=1e6).velocity_counts_per_s
+    assert int(np.flatnonzero(seen)[0]) == sample
+
+
 def test_real_stamps_are_worth_more_than_edges_that_are_spread():
     """With the same counts, an estimator by stamps is closer to the exact velocity where it sees the real edges."""
     made = recording(MADE)

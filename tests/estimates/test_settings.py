@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from hardwall.model.estimators.registry import ESTIMATORS
+from hardwall.model.record_axis import DECODER_CLOCKS
 from hardwall.sim.estimates.replay import replay
 from hardwall.sim.estimates.replay_plan import ArgumentError
 from hardwall.sim.estimates.settings import SettingError, Settings, names_of, settings_of
@@ -98,3 +99,15 @@ def test_gains_that_no_axis_has_are_refused():
     settings = Settings({"lambda_sqrt_counts_per_s": 1e-15, "alpha_counts_per_s2": 1e15})
     with pytest.raises(ArgumentError, match=r"^settings must give an axis \(as if 1024 samples were a second\): "):
         replay(swing(), settings=settings)
+
+
+@pytest.mark.parametrize(
+    ("estimator", "gain", "factor"), [("levant", "lambda_sqrt_counts_per_s", 0.125), ("least-squares", "window_s", 8.0)]
+)
+def test_a_sample_has_clocks_for_the_longer_path_of_given_gains(estimator, gain, factor):
+    """The clocks of a sample were chosen for the derived gains, before whose drive no edge of the next sample came."""
+    derived = replay(swing(), estimator, None, "fixed", COARSEN, BOUND)
+    gains = {name: value * (factor if name == gain else 1) for name, value in derived.gains.items()}
+    spec = replay(swing(), estimator, None, "fixed", COARSEN, BOUND, settings=Settings(gains)).spec
+    needed = spec.design.latency_to_drive + DECODER_CLOCKS
+    assert derived.spec.clocks_per_sample < needed <= spec.clocks_per_sample

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hardwall.sim.recordings.capture import Changes
-from hardwall.sim.recordings.decoded import counts_at, edges_of
+from hardwall.sim.recordings.capture import Capture, Changes
+from hardwall.sim.recordings.decoded import counts_at, edges_of, recording_of
 from hardwall.sim.recordings.error import RecordingError
 from hardwall.sim.recordings.recording import EdgeRecord
 from stimuli.forms import TICK_HZ, edges, saleae, samples, session, sigrok_csv, vcd, waveforms
@@ -79,6 +79,23 @@ def test_an_edge_at_the_time_of_a_sample_is_counted_there():
         ticks = np.arange(1, 50)
         exact = counts_at(EdgeRecord(rate, ticks, ticks, 0), rate, 50)
         assert exact.tolist() == list(range(50))
+
+
+@pytest.mark.parametrize(("rate", "last"), [(1000.0, 1001), (10_000.0, 3), (48_000.0, 54)])
+def test_a_sample_at_the_end_of_the_capture_is_one_of_it(rate, last):
+    """In float64 the end is a part in 10^16 before such a sample."""
+    end = round(last * TICK_HZ / rate)
+    assert end / TICK_HZ * rate < last
+
+    class Made(Capture):
+        name, form, channels = "made", "made", ["A", "B"]
+
+        def changes(self, places):
+            return Changes(float(TICK_HZ), np.array([1, end]), np.array([1, 3]), 0, end)
+
+    found = recording_of(Made(), "made", (), rate)
+    assert len(found.counts) == last + 1
+    assert found.counts[-1] == 2
 
 
 def test_the_index_is_said(read):

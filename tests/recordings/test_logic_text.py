@@ -5,6 +5,7 @@ import io
 import numpy as np
 import pytest
 
+from hardwall.sim.recordings import capture
 from stimuli.forms import edges, saleae
 
 TICKS, _, COUNTS = edges()
@@ -26,6 +27,7 @@ def test_whole_times_need_their_unit(read, refused):
         ("A,B\n0,1\n1,1\n", "a capture must have times (--time COLUMN), or state its sample rate"),
         ("time_s,A,B\n0.1,0,1\n0.2,2,1\n", "line 3, column A: a level must be 0 or 1, not '2': name the channels"),
         ("time_s,A,B\n0.1,0,1\n0.1,1,1\n0.2,0,1\n", "column time_s: times must increase from one change of levels"),
+        ("time_s,A,B\n0.1,0,1\n0.2,1,1\n0.15,1,1\n", "column time_s: times must increase from one change of levels"),
         ("time_s,A,B\n0.1,0,1\n", "must have at least 2 rows of levels, not 1"),
     ],
 )
@@ -55,3 +57,8 @@ def test_a_capture_of_any_length_has_its_edges(read, apart_s, form):
     how = {"time": "t", "time_unit": "s", "file": f"spindle.{form}"}
     found = read(content, None, 0.1, **how).edges
     assert (found.ticks / found.tick_hz).tolist() == pytest.approx((number[1:] * apart_s).tolist(), rel=1e-12)
+
+
+def test_changes_are_bounded(refused, monkeypatch):
+    monkeypatch.setattr(capture, "CHANGES_MAX", 399)
+    assert refused(saleae(), None, 1000.0).endswith("must have at most 399 changes of its channels")

@@ -152,3 +152,17 @@ def test_times_with_a_unit_of_their_own_have_no_other(read, refused, kind, own, 
         content, time_unit="ms", **how
     )
     assert read(content, time_unit=own, **how).rate_hz == 1000.0
+
+
+def test_timestamps_have_nanoseconds_and_no_more():
+    digits = "123456789", "123456790", "1234567919", "12345679"
+    times = whole([f"2024-05-01T12:00:00.{each}" for each in digits], "iso")
+    assert times.since.tolist() == [0.0, 1e-9, 2e-9, 1e-9]
+    assert times.decimals == 9
+
+
+def test_the_first_row_of_a_text_without_names_may_have_a_timestamp(read):
+    lines = [f"2024-05-01T12:00:{k / 1000:06.3f},{count}" for k, count in enumerate(COUNTS)]
+    found = read("\n".join(lines), "2", time="1")
+    assert (found.counts == COUNTS).all()
+    assert found.rate_hz == 1000.0

@@ -6,6 +6,7 @@ import time
 import numpy as np
 import pytest
 
+from hardwall.sim.recordings.error import RecordingError
 from hardwall.sim.recordings.steps import Steps
 from hardwall.sim.recordings.table import Arrays
 
@@ -217,6 +218,13 @@ def test_an_angle_too_fast_for_its_turn_is_refused(refused):
     )
 
 
+def test_a_jump_of_a_turn_is_no_wrap_of_an_angle_of_several_turns(refused):
+    angles = 0.18 * np.concatenate([np.arange(0, 4000, 7), np.arange(0, 4000, 7) + 2000])
+    said = refused("a\n" + "".join(f"{a:.2f}\n" for a in angles), "a", rate_hz=1000, unit="deg", count=0.18)
+    assert "line 574, column a: the count must not go by -1997" in said
+    assert said.endswith("correct this line, or cut the recording at this line")
+
+
 def test_jumps_after_standstills_take_linear_time():
     """Each looked at all the steps before it: eight times as many samples took forty times as long."""
 
@@ -265,3 +273,77 @@ def test_a_motion_in_a_gap_is_no_wrap(read, jump):
     counts = RAMP[:1000].copy()
     counts[500:] += jump
     assert (read(with_gaps(counts, (480, 500)), gaps="hold").counts[500:] == counts[500:]).all()
+
+
+def test_a_wrap_that_would_be_too_fast_for_a_gap_is_none(read):
+    """An 8-bit counter would have gone by 56 in 10 samples, where 1 is the fastest."""
+    counts = np.concatenate([np.arange(251), np.arange(50, 251)])
+    lines = with_gaps(np.insert(counts, 251, [0] * 9), (251, 260))
+    assert (np.diff(read(lines, gaps="hold").counts)[259:] == np.diff(counts)[250:]).all()
+
+
+# ---- the limits ------------------------------------------------------------------------------------------------------
+
+
+def steps_of(steps, **how):
+    counts = np.concatenate([[0], np.cumsum(steps)])
+    return Steps(TABLE, "counts", range(len(counts)), counts, np.ones(len(steps), int)).unwrapped(None, **how)
+
+
+@pytest.mark.parametrize(
+    ("beside", "most"),
+    [
+        ([100, 120, 100, 120, 100, 120], 110 + 4 * 20),
+        ([1, 1, 1, 1, 1, 1], 1 + 4 * 8),
+    ],
+    ids=["four times the spread", "eight of the smallest steps"],
+)
+@pytest.mark.parametrize("beyond", [0, 1])
+def test_how_far_a_step_may_be_off(beside, most, beyond):
+    steps = [1, *([beside[0]] * 8), *beside[:3], most + beyond, *beside[3:], *([beside[-1]] * 8)]
+    if beyond:
+        with pytest.raises(RecordingError, match=rf"the count must not go by {most + 1} in one sample"):
+            steps_of(steps, may_stand=False)
+    else:
+        assert len(steps_of(steps, may_stand=False).counts) == len(steps) + 1
+
+
+@pytest.mark.parametrize(("number", "checked"), [(6, False), (7, True)])
+def test_how_few_steps_are_not_checked(number, checked):
+    steps = [1, 1, 1000] + [1] * (number - 3)
+    if checked:
+        with pytest.raises(RecordingError, match="the count must not go by 1000"):
+            steps_of(steps, may_stand=False)
+    else:
+        assert steps_of(steps, may_stand=False).counts[-1] == number - 1 + 1000
+
+
+@pytest.mark.parametrize(("stood", "taken"), [(3, False), (4, True)])
+def test_how_long_a_sensor_stands(stood, taken):
+    steps = [1] * 20 + [0] * stood + [1000] + [1] * 20
+    if taken:
+        assert steps_of(steps, may_stand=True).cuts.tolist() == [20 + stood + 1]
+    else:
+        with pytest.raises(RecordingError, match=r"the count must not go by 1000 .*: correct this line"):
+            steps_of(steps, may_stand=True)
+
+
+@pytest.mark.parametrize(("step", "found"), [(3, True), (4, False)])
+def test_how_far_a_step_across_the_end_of_a_range_may_be_off(read, refused, step, found):
+    counts = np.cumsum([1] * 255 + [step] + [1] * 300) % 256
+    text = "counts\n" + "".join(f"{count}\n" for count in counts)
+    if found:
+        assert "a counter of 8 bits that wrapped 2 times" in read(text, rate_hz=1000).notes
+    else:
+        assert "line 257, column counts: the count must not go by -252" in refused(text, rate_hz=1000)
+
+
+def test_a_step_longer_than_a_quarter_of_the_range_has_no_direction(read, refused):
+    for step, found in ((64, True), (65, False)):
+        counts = np.cumsum(np.minimum(np.arange(80), step)) % 256
+        counts = np.concatenate([np.arange(256), counts])
+        text = "counts\n" + "".join(f"{count}\n" for count in counts)
+        if found:
+            assert np.diff(read(text, rate_hz=1000).counts).max() == 64
+        else:
+            assert "the count must not go by" in refused(text, rate_hz=1000)

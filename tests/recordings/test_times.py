@@ -145,3 +145,19 @@ def test_the_rate_of_times_in_floating_point_is_a_round_number(read, rate, start
     assert abs(found / rate - 1) <= 2 * max(part, 1e-12)
     if rate != 1 / 3:
         assert found == rate
+
+
+@pytest.mark.parametrize(("off", "agrees"), [(0.0099, True), (-0.0099, True), (0.0101, False), (-0.0101, False)])
+def test_a_mean_rate_agrees_within_one_in_a_hundred(read, refused, off, agrees):
+    lines = [f"{k * (1 + off):.6f},{k}" for k in range(1000)]
+    if agrees:
+        assert read(lines, rate_hz=1, header="timestamp,counts").rate_hz == 1
+    else:
+        assert "times must agree with the rate 1 Hz within 1%" in refused(lines, rate_hz=1, header="timestamp,counts")
+
+
+def test_whole_seconds_are_seconds_where_a_unit_or_another_name_says_so(read, refused):
+    lines = stamped(range(20), "{}")
+    assert "may be of another unit" in refused(lines)
+    assert read(lines, time_unit="s").rate_hz == 1
+    assert read(lines, header="seconds,counts").rate_hz == 1
