@@ -62,6 +62,9 @@ def command(
             "--rates, --encoder-phase-error and --acceleration-max are for known motions, as is --set: a recording has "
             "its own"
         )
+    if options.given and not recorded:
+        hint = ": the rates of known motions are --rates" if options.rate is not None else ""
+        raise BadInput(f"{', '.join(options.given)} must be absent without a recording{hint}")
     if acceleration_max is not None:
         within(acceleration_max, "--acceleration-max", *ACCELERATIONS_M_PER_S2, "m/s^2")
     at = figures.RATES_HZ[figure or 2] if rates is None else rates_of(rates, "--rates")

@@ -86,6 +86,11 @@ class ReadingOptions(StudyOptions):
             channels=channels,
         )
 
+    @property
+    def given(self) -> list[str]:
+        """The options of a recording that are given."""
+        return [f"--{each.replace('_', '-')}" for each in READING if getattr(self, each) != getattr(type(self), each)]
+
     def read(self, file: str | Path, column: str | None) -> Recording:
         """Return the recording in a file.
 

@@ -1,7 +1,7 @@
 """A capture of edges through an axis, on any backend: their clocks, the axis' clock, and the reference through them.
 
-The clock of the axis is as fast as the ticks of the capture, at most `CLOCK_MAX_HZ`, and fast enough for two edges
-never to fall into one clock. So a stamp of an edge is as fine as the capture has it.
+The clock of the axis is as fast as the ticks of the capture, at most `CLOCK_MAX_HZ`. So a stamp of an edge is as fine
+as the capture has it, and two edges never fall into one clock: closer ones than `CLOCK_MAX_HZ` allows are refused.
 
 The reference. At an edge the position is known to a tick: it is the place of the edge on the scale. A cubic curve goes
 from edge to edge, with the slope of a parabola through each edge and those beside it. The curve is monotone between two
@@ -52,8 +52,11 @@ def with_clock(spec: AxisSpec, edges: EdgeRecord, rate_hz: float) -> AxisSpec:
         spec: the axis, in units of its own (`replay_axis`).
         edges: the edges, no two within one clock at `CLOCK_MAX_HZ`.
         rate_hz: the sample rate.
+
+    Raises:
+        ValueError: if the estimator has no words for so many clocks in a sample; the message names the field.
     """
-    wanted = max(min(edges.tick_hz, CLOCK_MAX_HZ), 1 / closest_s(edges)) / rate_hz
+    wanted = min(edges.tick_hz, CLOCK_MAX_HZ) / rate_hz
     clocks = 1 << max(int(np.ceil(np.log2(wanted))), 0)
     return replace(spec, clock_hz=max(clocks, spec.clocks_per_sample) * spec.sample_hz)
 

@@ -3,8 +3,8 @@
 The reference is the central difference of the recorded counts, through a 4th-order Butterworth filter forward and
 backward, so it has no delay. The cutoff is `REFERENCE_HZ`, or a quarter of the sample rate where that is less.
 
-The bound C on the acceleration is the largest |derivative| of the reference velocity after the first second, rounded up
-to two digits. A designer would know it of the motion; an estimator could not know it at the time.
+The bound C on the acceleration is the largest |derivative| of the reference velocity over the samples that are judged,
+rounded up to two digits. A designer would know it of the motion; an estimator could not know it at the time.
 """
 
 import math
@@ -32,12 +32,14 @@ def zero_phase_velocity(counts: np.ndarray, rate_hz: float, cutoff_hz: float) ->
     return scipy.signal.sosfiltfilt(sections, derivative, padlen=extension)
 
 
-def acceleration_bound(velocity: np.ndarray, rate_hz: float) -> float:
-    """Return the largest |derivative| of a velocity after the first second, rounded up to two digits.
+def acceleration_bound(velocity: np.ndarray, rate_hz: float, first: int) -> float:
+    """Return the largest |derivative| of a velocity from a sample on, rounded up to two digits.
 
-    A record no longer than a second is used from its start.
+    Args:
+        velocity: the velocity of every sample.
+        rate_hz: the sample rate.
+        first: number of the first sample that is judged; if there is none, all samples count.
     """
-    first = judged_from(rate_hz)
     acceleration = np.gradient(velocity) * rate_hz
     largest = float(np.abs(acceleration[first:] if len(velocity) > first else acceleration).max())
     if largest == 0:

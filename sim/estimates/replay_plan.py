@@ -168,7 +168,8 @@ def plan(
     reference = zero_phase_velocity(position, rate, cutoff)
     bound = given
     if bound is None:
-        bound = max(acceleration_bound(reference, rate), least_acceleration(counts) * coarsen * rate**2)
+        largest = acceleration_bound(reference, rate, first_judged(recording))
+        bound = max(largest, least_acceleration(counts) * coarsen * rate**2)
     try:
         spec = axis_spec(counts, coarsen, bound / rate**2, estimator, time)
     except ValueError as error:
@@ -179,7 +180,13 @@ def plan(
         raise ArgumentError("settings", f"must give an axis ({time.said}): {error}") from None
     if whole is not None and needs_pins(estimator, backend):
         edges = coarse(whole, coarsen)
-        spec = with_clock(spec, edges, rate)
+        try:
+            spec = with_clock(spec, edges, rate)
+        except ValueError as error:
+            raise ReplayError(
+                f"{recording.file}, column {recording.column}: {estimator} cannot take this capture at {rate:g} Hz, "
+                f"for a sample has too many ticks of the capture ({time.said}: {error}): give a higher rate (--rate)"
+            ) from None
     return Plan(counts, cutoff, reference, bound, spec, edges)
 
 

@@ -1,4 +1,4 @@
-"""What a replay sets of its axis beyond C: the gains, the bound on the jerk, and the error of edges that is borne.
+"""What a replay sets of its axis beyond C: the gains, the bound on the jerk, and the error of single edges.
 
 Everything is in recorded counts and true seconds, by the keys that a scene has with metres: `gains.ESTIMATOR.NAME`,
 `jerk_max_counts_per_s3` and `edge_error_max_counts` of its section `controller`. An axis counts in samples: see
@@ -24,7 +24,7 @@ class Settings:
     Attributes:
         gains: the gains of the estimator, by their names, in counts and seconds; empty for its own.
         jerk_max_counts_per_s3: bound on the jerk between impacts.
-        edge_error_max_counts: RMS error of single edges that estimates are to bear, in counts that the estimator sees.
+        edge_error_max_counts: RMS error of single edges, in counts that the estimator sees.
     """
 
     gains: dict[str, float] = field(default_factory=dict)
@@ -36,6 +36,11 @@ GAIN_RANGE = 1e-15, 1e15
 EDGE_ERROR_RANGE = 1e-6, 1.0
 """The ranges of a scene's keys: see `scene.quantities`."""
 SECTION = "controller."
+BOUNDS = {
+    "jerk_max_counts_per_s3": (GAIN_RANGE, ("edge-kalman",)),
+    "edge_error_max_counts": (EDGE_ERROR_RANGE, ("edge-kalman", "mt", "mt-divisionless")),
+}
+"""The bounds by their keys: their ranges, and the estimators whose gains follow from them."""
 
 
 class SettingError(ValueError):
@@ -50,18 +55,15 @@ def settings_of(changes: Mapping[str, Any], estimator: str) -> Settings:
         estimator: the estimator whose gains may be set.
 
     Raises:
-        SettingError: if a key or a value is not valid, or some of the gains are lacking.
+        SettingError: if a key or a value is not valid, some of the gains are lacking, or a bound is given beside them.
     """
     names = names_of(estimator)
     keys = {f"{SECTION}gains.{estimator}.{name}": (name, GAIN_RANGE) for name in names}
-    bounds = {
-        f"{SECTION}jerk_max_counts_per_s3": ("jerk_max_counts_per_s3", GAIN_RANGE),
-        f"{SECTION}edge_error_max_counts": ("edge_error_max_counts", EDGE_ERROR_RANGE),
-    }
+    bounds = {f"{SECTION}{name}": (name, reach) for name, (reach, of) in BOUNDS.items() if estimator in of}
     found = {}
     for key, value in changes.items():
         if key not in keys | bounds:
-            known = ", ".join(keys | bounds)
+            known = ", ".join(keys | bounds) or "none"
             raise SettingError(f"{shown(key)} is not a key of a replay with {estimator}, which has {known}")
         name, (least, most) = (keys | bounds)[key]
         if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
@@ -71,6 +73,8 @@ def settings_of(changes: Mapping[str, Any], estimator: str) -> Settings:
     lacking = [name for name in names if name not in gains]
     if gains and lacking:
         raise SettingError(f"{SECTION}gains.{estimator} must have all its gains: {', '.join(lacking)} is missing")
+    if gains and found:
+        raise SettingError(f"{SECTION}{min(found)} must be absent beside the gains, which it would set")
     return Settings(gains, **found)
 
 

@@ -18,6 +18,7 @@ from .table import Arrays
 BYTES_MAX = 2 * 10**9
 """The largest file that is read whole, and the most that its arrays may take."""
 COLUMNS_MAX = 1000
+"""The most columns of a file, its first ones."""
 
 
 def check_size(name: str, size: int) -> None:
@@ -50,9 +51,17 @@ def npy_table(name: str, path: str | Path) -> Arrays:
         check_size(name, array.nbytes)
     if array.dtype.names:
         return table_of(name, "a NumPy array", {key: np.array(array[key]) for key in array.dtype.names})
-    flat = np.array(array)
-    columns = [flat] if flat.ndim == 1 else list(flat.T if flat.ndim == 2 and len(flat) >= flat.shape[1] else flat)
+    if array.ndim not in (1, 2):
+        raise RecordingError(f"{name}: must be an array of 1 or 2 dimensions, not {array.ndim}")
+    columns = list(_across(np.array(array)))[:COLUMNS_MAX]
     return Arrays(name, "a NumPy array", {str(place + 1): column for place, column in enumerate(columns)}, names=False)
+
+
+def _across(array: np.ndarray) -> np.ndarray:
+    """Return an array of one or two dimensions as its columns, those of two along its shorter side."""
+    if array.ndim == 1:
+        return array[None, :]
+    return array.T if array.shape[0] >= array.shape[1] else array
 
 
 def table_of(name: str, form: str, found: dict[str, object]) -> Arrays:
@@ -82,11 +91,10 @@ def _columns(name: str, value: object) -> Iterator[tuple[str, np.ndarray]]:
             return
         for member in value._fieldnames:
             yield from _columns(f"{name}.{member}", getattr(value, member))
-    elif isinstance(value, np.ndarray) and value.dtype.kind in "iufbMUSO" and value.size > 1:
+    elif isinstance(value, np.ndarray) and value.dtype.kind in "iufbMmUSO" and value.size > 1:
         if value.dtype.kind == "O" and not all(isinstance(each, str) for each in value.flat):
             return
         if value.ndim == 1:
             yield name, value
         elif value.ndim == 2:
-            across = value.T if value.shape[0] >= value.shape[1] else value
-            yield from ((f"{name}.{place + 1}", column) for place, column in enumerate(across))
+            yield from ((f"{name}.{place + 1}", column) for place, column in enumerate(_across(value)))

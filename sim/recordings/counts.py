@@ -13,6 +13,7 @@ import numpy as np
 from ...model.checks import shown
 from .error import RecordingError, plain
 from .stamps import decimal_of
+from .steps import SPAN_BITS
 from .table import Cells, Table
 
 COUNT_BITS = 62
@@ -39,6 +40,15 @@ def size_of(text: str) -> float | None:
     return size if 0 < size < math.inf else None
 
 
+def turn_of(unit: str, size: float | None) -> int | None:
+    """Return the counts of one turn; None for a unit without turns, or a size that does not divide a turn."""
+    if unit not in TURN or size is None:
+        return None
+    parts = TURN[unit] / size
+    whole = parts < 1 << SPAN_BITS and abs(parts - round(parts)) <= OFF_MAX
+    return round(parts) if whole and round(parts) > 1 else None
+
+
 class Counts:
     """The counts of samples, which are added chunk by chunk.
 
@@ -59,6 +69,9 @@ class Counts:
         Raises:
             RecordingError: if a cell is no count, or no number.
         """
+        if isinstance(cells, np.ndarray) and cells.dtype.kind in "Mm":
+            what = "counts" if self._unit == "counts" else f"values in {self._unit}"
+            raise RecordingError(f"{self._table.name}, column {plain(self._column)}: must have {what}, not times")
         if self._unit == "counts":
             self._parts.append(self._counts(lines, cells))
             return
@@ -118,7 +131,7 @@ class Counts:
         if number is not None and number.is_finite() and number != 0:
             if number.adjusted() < 18:
                 cure = ": for an angle or a length, say its unit and the size of a count (--unit, --count)"
-            elif number.adjusted() < 20:
+            elif number.adjusted() < 20 and not self._wide:
                 cure = ": for a counter of 64 bits, say so (--counter-bits 64)"
         return RecordingError(f"{self._where(line)}: {WHOLE_COUNT}, not {shown(text)}{cure}")
 

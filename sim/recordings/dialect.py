@@ -7,8 +7,10 @@ The rules, in this order:
 - Separator. It is the first of tab, semicolon, comma and spaces that the first other line has, outside quotes. A comma
   that leaves two numbers beside each other in a cell is a decimal comma: then spaces separate.
 - Decimal comma. Where no comma separates, a cell `1,5` is the number 1.5.
-- Names. The first line names the columns if one of its cells is neither a number nor a time. If it does not, the last
-  comment before it does, provided that it has as many cells, and one of them is no number.
+- Names. The first line names the columns if one of its cells is neither a number, nor a time, nor a word for nothing
+  such as `n/a`. A line that also has numbers is a row instead if one of them is a time or has a decimal point, or if
+  its other cells stand over texts alone. If the first line does not name the columns, the last comment before it does,
+  provided that it has as many cells, and one of them is no number.
 - A comment `Channels (2/8): A, B` of sigrok names the columns that a header calls `logic`, and a comment
   `Samplerate: 1 MHz` or `Sample rate: 1e+06Hz` is the rate of rows without times.
 """
@@ -18,15 +20,18 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from .capture import hertz_of
+
 COMMENT = re.compile(r"\s*(?:#|%|//)")
 COMMENT_ABOVE = re.compile(r"\s*(?:#|%|//|; )")
 """What a comment begins with, everywhere and above the first row."""
 NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)", re.IGNORECASE)
 ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:[.,]\d+)?)?(?:Z|[+-]\d\d:?\d\d)?")
+NOTHING = re.compile(r"[-?.*]+|n\.?/?a\.?|none|null|nil|missing", re.IGNORECASE)
+"""What programs write in place of a number that they do not have."""
 DECIMAL_COMMA = re.compile(r"\d,\d|(?:^|[\s;+-]),\d")
 _CHANNELS = re.compile(r"\W*channels?\s*\(\d+/\d+\)\s*:\s*(.+)", re.IGNORECASE)
-_RATE = re.compile(r"\W*sample ?rate\s*:\s*([0-9.]+(?:e[+-]?\d+)?)\s*([kMG]?)Hz", re.IGNORECASE)
-_PREFIX = {"": 1.0, "k": 1e3, "m": 1e6, "g": 1e9}
+_RATE = re.compile(r"\W*sample ?rate\s*:\s*(.+)", re.IGNORECASE)
 _NAMES = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "spaces"}
 
 
@@ -71,8 +76,31 @@ def cells_of(line: str, separator: str) -> list[str]:
 
 
 def is_value(cell: str) -> bool:
-    """Return whether a cell is a number, a time, or empty."""
-    return not cell or bool(NUMBER.fullmatch(cell) or ISO.fullmatch(cell))
+    """Return whether a cell is a number, a time, or nothing."""
+    return not cell or _is_number(cell) or bool(NOTHING.fullmatch(cell))
+
+
+def _is_number(cell: str) -> bool:
+    """Return whether a cell is a number or a time."""
+    return bool(NUMBER.fullmatch(cell) or ISO.fullmatch(cell))
+
+
+def _are_names(cells: list[str], rows: list[str], separator: str) -> bool:
+    """Return whether the cells of the first line name the columns of the rows behind it."""
+    texts = [place for place, cell in enumerate(cells) if not is_value(cell)]
+    numbers = [cell for cell in cells if _is_number(cell)]
+    if not texts or not numbers:
+        return bool(texts)
+    if not all(cell.isdigit() for cell in numbers):
+        return False
+    parsed = (row.split() for row in rows) if separator == " " else csv.reader(rows, delimiter=separator)
+    below = [row[place].strip() for row in parsed for place in texts if place < len(row)]
+    return not below or any(map(_is_number, below))
+
+
+def is_above(line: str) -> bool:
+    """Return whether a line before the first row is blank, or a comment."""
+    return not line.strip() or bool(COMMENT_ABOVE.match(line))
 
 
 def dialect_of(lines: Sequence[str]) -> Dialect | None:
@@ -82,7 +110,7 @@ def dialect_of(lines: Sequence[str]) -> Dialect | None:
         csv.Error: if a quote is out of place.
     """
     comments, first = [], 0
-    while first < len(lines) and (not lines[first].strip() or COMMENT_ABOVE.match(lines[first])):
+    while first < len(lines) and is_above(lines[first]):
         if lines[first].strip():
             comments.append(first)
         first += 1
@@ -91,7 +119,7 @@ def dialect_of(lines: Sequence[str]) -> Dialect | None:
     rows = [line for line in lines[first:] if line.strip() and not COMMENT.match(line)]
     separator = _separator(rows)
     cells = cells_of(lines[first], separator)
-    names, named_by = ([], 0) if all(map(is_value, cells)) else (cells, first + 1)
+    names, named_by = (cells, first + 1) if _are_names(cells, rows[1:], separator) else ([], 0)
     skipped = named_by or first
     if not names and comments:
         text = COMMENT_ABOVE.sub("", lines[comments[-1]], count=1).strip()
@@ -131,4 +159,4 @@ def _channels(comments: list[str], names: list[str], width: int) -> list[str]:
 
 def _rate(comments: list[str]) -> float | None:
     match = next(filter(None, map(_RATE.match, comments)), None)
-    return float(match[1]) * _PREFIX[match[2].lower()] if match else None
+    return hertz_of(match[1]) if match else None

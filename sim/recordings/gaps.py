@@ -1,7 +1,10 @@
 """Samples that are missing in a recording, and samples that are in it twice.
 
-An interval of `USUAL` usual ones or more is a gap: as many samples are missing as make the interval whole. A sample is
-repeated if its time and its count are those of the sample before. The rules:
+An interval that is nearer to two usual ones, or more, than to one is a gap; what is less is jitter. As many samples are
+missing as bring the pieces on either side into one line, each by the mean of its times. Stamps that are rounded to a
+unit give intervals of two lengths, one unit apart. So an interval that is longer by less than `UNITS` units is a gap
+only if the rate that is given says so; without a rate, unless there are `MANY` of them, spread as evenly as rounding
+does. A sample is repeated if its time and its count are those of the sample before. The rules:
 
 - `refuse`: either is an error.
 - `hold`: a gap is filled with the count before it, as a controller sees it; repeated samples are taken out.
@@ -17,10 +20,13 @@ import numpy as np
 
 from .error import RecordingError
 from .recording import SAMPLES_MAX
+from .stamps import Times
 
 RULES = ("refuse", "hold", "split")
-USUAL = 1.5
-"""From how many usual intervals on one may lack a sample; what is less is jitter."""
+UNITS = 2
+"""By how many units of a time stamp a gap is longer than the usual interval, beyond doubt."""
+MANY = 8
+"""How many longer intervals can be told from lost samples by how evenly they are spread."""
 
 
 class Grid(NamedTuple):
@@ -37,9 +43,9 @@ class Grid(NamedTuple):
     notes: list[str]
 
     @property
-    def gaps(self) -> np.ndarray:
-        """For every step from a row to the next, whether samples are missing between them."""
-        return np.diff(self.numbers) > 1
+    def passed(self) -> np.ndarray:
+        """How many intervals of a sample it is from every row to the next: more than 1 where samples are missing."""
+        return np.diff(self.numbers)
 
 
 def whole(length: int) -> Grid:
@@ -48,28 +54,68 @@ def whole(length: int) -> Grid:
     return Grid(rows, rows, [])
 
 
-def grid_of(name: str, since: np.ndarray, counts: np.ndarray, rule: str) -> Grid:
+def passed_in(steps: np.ndarray, unit: float, rate_hz: float | None) -> np.ndarray:
+    """Return how many intervals of a sample the intervals between times take: more than 1 where samples are missing.
+
+    Args:
+        steps: the intervals, all of them positive.
+        unit: the resolution of a time.
+        rate_hz: the sample rate, in samples a unit of the intervals; None if it is not known.
+    """
+    usual = float(np.median(steps))
+    longer = np.rint(steps / usual) > 1
+    # A little less than so many units, for the rounding of the intervals.
+    certain = longer & (steps - usual >= (UNITS - 1e-3) * unit)
+    fewest, doubtful = _whole(steps, certain, rate_hz), np.count_nonzero(longer & ~certain)
+    if not doubtful:
+        return fewest
+    most = _whole(steps, longer, rate_hz)
+    if rate_hz is not None:
+        return most if _fits(steps, most, unit, rate_hz) else fewest
+    return fewest if doubtful >= MANY and _fits(steps, fewest, unit, None) else most
+
+
+def _whole(steps: np.ndarray, lacking: np.ndarray, rate_hz: float | None) -> np.ndarray:
+    """Return how many intervals of a sample each takes, if samples are missing in some of them."""
+    interval = float(steps[~lacking].mean()) if rate_hz is None else 1 / rate_hz
+    passed, gaps = np.ones(len(steps)), np.flatnonzero(lacking)
+    begins = np.append(0, gaps + 1)
+    late = np.append(0.0, np.cumsum(steps)) - np.arange(len(steps) + 1) * interval
+    means = np.add.reduceat(late, begins) / np.diff(begins, append=len(late))
+    passed[gaps] += np.maximum(np.rint(np.diff(means) / interval), 0.0)
+    return passed
+
+
+def _fits(steps: np.ndarray, passed: np.ndarray, unit: float, rate_hz: float | None) -> bool:
+    """Return whether all times are within a unit of those of a rate, or of the line from the first to the last."""
+    since, numbers = np.cumsum(steps), np.cumsum(passed)
+    interval = since[-1] / numbers[-1] if rate_hz is None else 1 / rate_hz
+    return bool((np.abs(since - numbers * interval) < unit * (1 - 1e-6)).all())
+
+
+def grid_of(name: str, times: Times, counts: np.ndarray, rule: str, rate_hz: float | None) -> Grid:
     """Return the grid of a recording by its times.
 
     Args:
         name: the file, for a message.
-        since: the time of every row after the first.
+        times: the time of every row.
         counts: the count of every row.
         rule: one of `RULES`.
+        rate_hz: the sample rate that is given; None for none.
 
     Raises:
         RecordingError: if more samples are missing than a recording may have.
     """
+    since = times.since
     if rule == "refuse" or len(since) < 3:
         return whole(len(since))
     twice = np.concatenate([[False], (np.diff(since) == 0) & (np.diff(counts) == 0)])
     rows = np.flatnonzero(~twice)
     notes = [f"{np.count_nonzero(twice)} repeated samples taken out"] if twice.any() else []
     steps = np.diff(since[rows])
-    usual = float(np.median(steps)) if len(steps) else 0.0
-    if usual <= 0 or (steps <= 0).any():
+    if not len(steps) or (steps <= 0).any():
         return Grid(rows, np.arange(len(rows)), notes)
-    passed = np.where(steps >= USUAL * usual, np.rint(steps / usual), 1.0)
+    passed = passed_in(steps, times.resolution, rate_hz)
     if passed.sum() >= SAMPLES_MAX:
         raise RecordingError(
             f"{name}: must have at most {SAMPLES_MAX} samples with those that are missing, not {passed.sum() + 1:.0f}: "
@@ -85,7 +131,7 @@ def grid_of(name: str, since: np.ndarray, counts: np.ndarray, rule: str) -> Grid
 
 def _longest(grid: Grid) -> Grid:
     """Return the longest piece of a grid between two gaps."""
-    return piece(grid, np.flatnonzero(grid.gaps) + 1)
+    return piece(grid, np.flatnonzero(grid.passed > 1) + 1)
 
 
 def piece(grid: Grid, cuts: np.ndarray) -> Grid:

@@ -8,8 +8,7 @@ import numpy as np
 
 from ...model.checks import shown
 from . import gaps
-from .capture import Capture
-from .counts import Counts
+from .counts import Counts, turn_of
 from .decoded import recording_of
 from .error import RecordingError, plain
 from .forms import source_of
@@ -55,14 +54,10 @@ def load(
         source = LogicTable(source, reading)
     elif column is not None:
         raise RecordingError(f"{name}: is a capture of edges, which has no column: name its channels (--channels)")
-    return _captured(source, str(path), rate_hz, reading)
-
-
-def _captured(capture: Capture, path: str, rate_hz: float | None, reading: Reading) -> Recording:
-    """Return the recording of a capture."""
-    if reading.unit != "counts" or reading.counter_bits is not None:
-        raise RecordingError(f"{capture.name}: is a capture of edges, so --unit and --counter-bits must be absent")
-    return recording_of(capture, path, reading.channels, rate_hz)
+    else:
+        reading.refuse(name, "is a capture with times of its own", "time", "time_unit")
+    reading.refuse(name, "is a capture of edges", "unit", "count", "counter_bits", "gaps")
+    return recording_of(source, str(path), reading.channels, rate_hz)
 
 
 class _Counted:
@@ -72,8 +67,13 @@ class _Counted:
         self._table, self._path, self._column, self._given, self._reading = table, path, column, rate_hz, reading
         self._place = table.place(column)
         self._time = time_column_of(table, reading, {self._place})
-        # The times of a column that was not asked for only have to agree with a rate that is given.
-        self._loose = rate_hz is not None and self._time is not None and not self._time.meant
+        reading.refuse(table.name, "is read as counts (--column)", "channels")
+        if self._time is None:
+            reading.refuse(table.name, "is read without times", "time_unit")
+        # The times of a column that was not asked for only have to agree with a rate that is given, unless they are to
+        # tell where samples are missing.
+        asked = reading.gaps != "refuse" or (self._time is not None and self._time.meant)
+        self._loose = rate_hz is not None and self._time is not None and not asked
         if self._time is None and rate_hz is None:
             raise RecordingError(
                 f"{table.name}: there is no column {TIME_COLUMN}, so the rate in Hz must be given (--rate), "
@@ -88,22 +88,25 @@ class _Counted:
         grid, times, unit = gaps.whole(len(counts)), None, None
         if stamps is not None:
             times, unit = self._seconds(stamps)
-            grid = gaps.grid_of(table.name, times.since, counts, reading.gaps)
+            grid = gaps.grid_of(table.name, times, counts, reading.gaps, self._given)
         # A lost sample is an uneven time and a jump of the count: the time says which it is.
         rate_hz, start_s = self._rate(lines, grid, times)
         unwrapped = self._unwrapped(lines, counts, grid)
+        counts = unwrapped.counts
         if reading.gaps == "split" and len(unwrapped.cuts):
-            grid = gaps.piece(grid, unwrapped.cuts)
+            longest = gaps.piece(grid, unwrapped.cuts)
+            counts = counts[np.searchsorted(grid.rows, longest.rows)]
+            grid = longest
             rate_hz, start_s = self._rate(lines, grid, times)
-            unwrapped = self._unwrapped(lines, counts, grid)
-        counts = gaps.held(unwrapped.counts, grid.numbers)
+        counts = gaps.held(counts, grid.numbers)
         notes = [table.form, *said, *self._said(rate_hz, unit), *unwrapped.notes, *grid.notes]
         column = table.called(self._place)
         return Recording(self._path, column, counts, rate_hz, start_s, notes=tuple(notes))
 
     def _unwrapped(self, lines: np.ndarray, counts: np.ndarray, grid: gaps.Grid) -> Unwrapped:
-        steps = Steps(self._table, self._column, lines[grid.rows], counts[grid.rows], grid.gaps)
-        return steps.unwrapped(self._reading.counter_bits, self._reading.gaps != "refuse")
+        reading, turn = self._reading, turn_of(self._reading.unit, self._reading.count)
+        steps = Steps(self._table, self._column, lines[grid.rows], counts[grid.rows], grid.passed, turn)
+        return steps.unwrapped(reading.counter_bits, reading.gaps != "refuse")
 
     def _read(self) -> tuple[np.ndarray, Counts, Stamps | None]:
         """Return the lines, the counts and the times of all rows."""
@@ -143,6 +146,7 @@ class _Counted:
     def _seconds(self, stamps: Stamps) -> tuple[Times, str]:
         """Return the times in seconds, and their unit."""
         times = stamps.whole()
+        stamps.check_unit(self._reading.time_unit)
         if stamps.unit == "iso":
             return times, "ISO timestamps"
         where = place_of(self._table.name, self._time.name)

@@ -3,6 +3,7 @@
 A row is a sample or a change of levels. Without times, rows are samples at the rate that a comment of the file states.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,6 +17,8 @@ from .time_column import place_of, time_column_of
 
 DECIMALS_MAX = 12
 """The most decimal places of a second that are kept: picoseconds."""
+TICK_DIGITS = 18
+"""The digits of a tick, which fit int64."""
 
 
 class LogicTable(Capture):
@@ -39,6 +42,9 @@ class LogicTable(Capture):
             raise RecordingError(
                 f"{table.name}: a capture must have times (--time COLUMN), or state its sample rate{self.otherwise}"
             )
+        if self._time is None:
+            reading.refuse(table.name, "is read without times", "time_unit")
+        self._given = reading.time_unit
         self._places = [place for place in range(table.width) if self._time is None or place != self._time.place]
         self.channels = [table.called(place) for place in self._places]
 
@@ -94,6 +100,7 @@ class LogicTable(Capture):
     def _timed(self, stamps: Stamps, levels: np.ndarray, start: int) -> Changes:
         """Return the changes with their times; the first time is that of the first row, the last of the last."""
         times, where = stamps.whole(), place_of(self.name, self._time.name)
+        stamps.check_unit(self._given)
         unit = stamps.unit if stamps.unit != "iso" else "s"
         if unit is None and times.decimals is not None and times.decimals > 0:
             unit = "s"
@@ -103,6 +110,8 @@ class LogicTable(Capture):
         if (np.diff(times.since[:-1]) <= 0).any() or times.since[-1] < times.since[-2]:
             raise RecordingError(f"{where}: times must increase from one change of levels to the next")
         decimals = DECIMALS_MAX if times.decimals is None else min(max(times.decimals, 0), DECIMALS_MAX)
+        # Ticks of a long capture must fit int64; a float64 has fewer digits than that.
+        decimals = min(decimals, TICK_DIGITS - math.ceil(math.log10(max(times.since[-1], 1.0))))
         ticks = np.rint(times.since * 10.0**decimals).astype(np.int64)
         return Changes(10.0**decimals, ticks[1:-1], levels, start, int(ticks[-1]), float(times.first))
 

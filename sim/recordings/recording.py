@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from ...model.requirements import RATES_HZ
+from .error import RecordingError
 
 SAMPLES_MAX = 10**7
 RATE_MIN_HZ = 0.1
@@ -37,6 +38,18 @@ class Reading:
     counter_bits: int | None = None
     gaps: str = "refuse"
     channels: tuple[str, ...] = ()
+
+    def refuse(self, name: str, what: str, *fields: str) -> None:
+        """Raise RecordingError if some fields are given, which a file has no use for.
+
+        Args:
+            name: the file.
+            what: why it has no use for them.
+            fields: names of fields.
+        """
+        given = [f"--{each.replace('_', '-')}" for each in fields if getattr(self, each) != getattr(Reading, each)]
+        if given:
+            raise RecordingError(f"{name}: {what}, so {' and '.join(given)} must be absent")
 
 
 @dataclass(frozen=True, eq=False)

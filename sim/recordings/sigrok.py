@@ -20,6 +20,7 @@ PIECE = 1 << 20
 UNIT_MAX = 8
 """The most bytes of a sample."""
 METADATA_MAX = 10**6
+"""The most bytes of the metadata, which are in memory."""
 
 
 class Sigrok(Capture):
@@ -53,7 +54,9 @@ class Sigrok(Capture):
         """Return the section of the first device with logic channels."""
         config = configparser.ConfigParser(interpolation=None, strict=False)
         with readable(self.name, "a session of sigrok"), zipfile.ZipFile(self._path) as archive:
-            text = archive.read("metadata")[:METADATA_MAX].decode()
+            if archive.getinfo("metadata").file_size > METADATA_MAX:
+                raise RecordingError(f"{self.name}: its metadata must have at most {METADATA_MAX} bytes")
+            text = archive.read("metadata").decode()
         try:
             config.read_string(text)
         except configparser.Error:

@@ -21,8 +21,8 @@ from .table import CHUNK, Cells, Table
 
 UNITS = {"s": 0, "ms": -3, "us": -6, "ns": -9}
 """The units of times, as powers of ten of a second."""
-TIME_MAX_S = 1e12
-"""The largest time stamp, either way: tens of thousands of years."""
+TIME_MAX_S, TIME_MAX = 1e12, 9e18
+"""The largest time stamp, either way: tens of thousands of years, and what int64 has, which is less in nanoseconds."""
 DIGITS_MAX, DIGITS_OF_FLOAT = 19, 17
 """The most digits of a whole number in int64, and those that tell every float64 apart."""
 LEAST_POWER = -400
@@ -96,19 +96,21 @@ class Stamps:
     @property
     def _most(self) -> float:
         """The largest time, in the unit, or in the smallest one."""
-        return TIME_MAX_S * 10.0 ** -UNITS.get(self.unit or "ns", 0)
+        return min(TIME_MAX_S * 10.0 ** -UNITS.get(self.unit or "ns", 0), TIME_MAX)
 
     def _add_numbers(self, lines: Sequence[int], cells: np.ndarray) -> None:
-        if cells.dtype.kind == "M":
-            self.unit = "iso"
-            wrong = np.isnat(cells)
-            self._parts.append((cells.astype("datetime64[ns]").view(np.int64).copy(), -9))
+        if cells.dtype.kind in "Mm":
+            self.unit = "iso" if cells.dtype.kind == "M" else "s"
+            exact = cells.astype(f"{cells.dtype.kind}8[ns]")
+            wrong = np.isnat(cells) | (exact.astype(cells.dtype) != cells)
+            self._parts.append((exact.view(np.int64).copy(), -9))
+        elif self.unit == "iso":
+            wrong = np.ones(len(cells), bool)
         elif cells.dtype.kind == "f":
-            values = cells.astype(np.float64)
-            wrong = ~(np.abs(values) <= self._most)
-            self._floats.append(values)
+            wrong = ~(np.abs(cells.astype(np.float64)) <= self._most)
+            self._floats.append(cells)
         else:
-            wrong = np.abs(cells.astype(np.float64)) > min(self._most, 1e18)
+            wrong = np.abs(cells.astype(np.float64)) > self._most
             self._parts.append((cells.astype(np.int64), 0))
         if wrong.any():
             place = int(np.argmax(wrong))
@@ -149,11 +151,19 @@ class Stamps:
             f"{where}: a time must be a number of {unit} of {-self._most:g} to {self._most:g}, not {shown(text)}"
         )
 
+    def check_unit(self, given: str | None) -> None:
+        """Raise RecordingError if times that have a unit of their own, those of NumPy, are to have another one."""
+        if given is not None and self.unit != given:
+            where = f"{self._table.name}, column {plain(self._column)}"
+            raise RecordingError(f"{where}: its times have a unit, so --time-unit must be absent, not {given}")
+
     def whole(self) -> "Times":
         """Return all the times."""
         if self._floats:
-            values = np.concatenate(self._floats)
-            return Times(values - values[0], None, Decimal(repr(float(values[0]))), Decimal(repr(float(values[-1]))))
+            stored = np.concatenate(self._floats)
+            values = stored.astype(np.float64)
+            first, last = (Decimal(repr(float(values[place]))) for place in (0, -1))
+            return Times(values - values[0], None, first, last, float(np.spacing(np.abs(stored).max())))
         decimals = max(-int(np.min(powers)) for _, powers in self._parts)
         first, last = _decimal(*self._parts[0], 0), _decimal(*self._parts[-1], -1)
         since = np.concatenate([_since(*part, first) for part in self._parts])
@@ -165,18 +175,32 @@ class Times:
 
     Attributes:
         since: float64: the time of every sample after the first.
-        decimals: how many decimal places the times have; None for float64.
+        decimals: how many decimal places the times have; None for floating point.
         first, last: the first and the last time, exactly.
+        spacing: the spacing of the floating-point numbers that hold the times, at the largest; 0 for decimals.
     """
 
-    def __init__(self, since: np.ndarray, decimals: int | None, first: Decimal, last: Decimal):
-        self.since, self.decimals, self.first, self.last = since, decimals, first, last
+    def __init__(self, since: np.ndarray, decimals: int | None, first: Decimal, last: Decimal, spacing: float = 0.0):
+        self.since, self.decimals, self.first, self.last, self.spacing = since, decimals, first, last, spacing
+
+    @property
+    def rounding(self) -> float:
+        """How exact times can be in floating point: their spacing, that of float64, or 1e-12 of the whole time."""
+        largest = max(abs(float(self.first)), abs(float(self.last)))
+        return max(self.spacing, float(np.spacing(largest)), 1e-12 * float(self.since[-1]))
+
+    @property
+    def resolution(self) -> float:
+        """The resolution of a time: its last decimal place, or its rounding, whichever is coarser."""
+        return self.rounding if self.decimals is None else max(10.0**-self.decimals, self.rounding)
 
     def scaled(self, power: int) -> "Times":
         """Return the times in a unit that is 10**-power times as large."""
         decimals = None if self.decimals is None else self.decimals - power
-        since = self.since * 10.0**power if power >= 0 else self.since / 10.0**-power
-        return Times(since, decimals, self.first.scaleb(power), self.last.scaleb(power))
+        since, spacing = (
+            each * 10.0**power if power >= 0 else each / 10.0**-power for each in (self.since, self.spacing)
+        )
+        return Times(since, decimals, self.first.scaleb(power), self.last.scaleb(power), spacing)
 
     def some(self, rows: np.ndarray | slice) -> "Times":
         """Return the times of some samples, in their order, the first of which stays the origin of `since`."""
@@ -184,7 +208,7 @@ class Times:
         if len(since) == len(self.since):
             return self
         first, last = (self.first + _nearest(each, self.decimals) for each in (since[0], since[-1]))
-        return Times(since - since[0], self.decimals, first, last)
+        return Times(since - since[0], self.decimals, first, last, self.spacing)
 
 
 def _nearest(value: float, decimals: int | None) -> Decimal:

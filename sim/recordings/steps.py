@@ -7,20 +7,23 @@ either side of it. With the median of these and their spread, the largest less t
 
 Where the speed itself jumps, at an impact, the spread is that jump, and the step lies within it. At the ends of a
 recording, where one side is missing, the largest of the other steps stands for the spread. A single wrong sample makes
-two opposite steps, which do not support each other.
+two opposite steps, which do not support each other. Where samples are missing, a step may be any.
 
-The width of the counter. If it is given, every step is taken modulo its range. If it is not, steps are taken modulo
-2**`SPAN_BITS`; where that leaves a step that is no motion, the counter may be narrower. Its width is then the least
-whose range holds all counts, of 8 to 31 bits, provided that
+The range of the counter. If its width is given, every step is taken modulo its range. If it is not, steps are taken
+modulo 2**`SPAN_BITS`; where that leaves a step that is no motion, or a step over missing samples that is faster than
+all others, the range may be smaller. It is then one turn, where the values are angles and span no more, or else the
+least power of two that holds all counts, of 8 to 31 bits, provided that
 
 - every step across the end of the range, once unwrapped, differs from the median of the steps beside it by no more than
-  their spread, or `CLOSE` of the smallest steps; and
+  their spread, or `CLOSE` of the smallest steps; over missing samples, it is no faster than the other steps; and
 - no step is longer than a quarter of the range, so that its direction is beyond doubt.
 
-A file that does not meet both has another fault than a counter that wrapped, and is refused.
+A file that does not meet both has another fault than a counter that wrapped, and is refused. Of a width that is given,
+a step across the end may differ by `JUMP` times the spread.
 """
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -64,13 +67,24 @@ class Steps:
         column: the column of the counts.
         lines: the line of every count in the file.
         counts: the counts as they are in the file, int64.
-        gaps: for every step, whether samples are missing there, so that it may be any.
+        passed: for every step, how many intervals of a sample it takes: more than 1 where samples are missing.
+        turn: counts of one turn, of angles; None for other values. Angles that span more have not wrapped at a turn.
     """
 
-    def __init__(self, table: Table, column: str, lines: Sequence[int], counts: np.ndarray, gaps: np.ndarray):
-        self._table, self._column, self._lines, self._counts, self._gaps = table, column, lines, counts, gaps
+    def __init__(
+        self,
+        table: Table,
+        column: str,
+        lines: Sequence[int],
+        counts: np.ndarray,
+        passed: np.ndarray,
+        turn: int | None = None,
+    ):
+        self._table, self._column, self._lines, self._counts = table, column, lines, counts
+        self._passed = passed
         # A difference of two int64 that is not negative is exact as an unsigned number modulo 2**64.
         self._spread = np.maximum.accumulate(counts).view(np.uint64) - np.minimum.accumulate(counts).view(np.uint64)
+        self._turn = turn if turn is not None and self._spread[-1] <= turn else None
 
     def _where(self, sample: int) -> str:
         return f"{self._table.at(self._lines[sample])}, column {plain(self._column)}"
@@ -86,17 +100,25 @@ class Steps:
             RecordingError: if the counts span too much, or a step is no motion.
         """
         self._check_span(bits)
-        steps, notes = _modulo(self._counts, bits or SPAN_BITS), []
-        if bits is None and (bits := self._found(steps)) is not None:
-            steps = _modulo(self._counts, bits)
-        wraps = np.count_nonzero(steps != _modulo(self._counts, COUNTER_BITS[1]))
-        if wraps or bits:
-            notes.append(f"a counter of {bits or SPAN_BITS} bits that wrapped {wraps} times")
+        size = 1 << (bits or SPAN_BITS)
+        steps, notes = _modulo(self._counts, size), []
+        found = self._found(steps) if bits is None else None
+        if found is not None:
+            size, steps = found, _modulo(self._counts, found)
+        wraps = steps != _modulo(self._counts, 1 << COUNTER_BITS[1])
+        if wraps.any() or bits or found:
+            what = "an angle" if found and found == self._turn else f"a counter of {size.bit_length() - 1} bits"
+            notes.append(f"{what} that wrapped {np.count_nonzero(wraps)} times")
+        if bits is not None:
+            self._check_width(bits, steps, wraps)
         cuts = self._check(steps, may_stand)
-        first = int(self._counts[0])
-        counts = np.concatenate([[0], np.cumsum(steps)]) + (first if abs(first) <= LARGEST else 0)
-        if abs(float(np.sum(steps, dtype=np.float64))) >= LARGEST or np.abs(counts).max() > 2 * LARGEST:
+        if np.abs(np.cumsum(steps, dtype=np.float64)).max() >= LARGEST:
             raise RecordingError(f"{self._where(0)}: counts must stay within 2**61 of the first, unwrapped")
+        counts, first = np.concatenate([[0], np.cumsum(steps)]), int(self._counts[0])
+        if first + int(counts.min()) >= -LARGEST and first + int(counts.max()) < LARGEST:
+            counts += first
+        else:
+            notes.append(f"counted from the first, {first}")
         return Unwrapped(counts, cuts, notes)
 
     def _check_span(self, bits: int | None) -> None:
@@ -112,55 +134,114 @@ class Steps:
             )
 
     def _found(self, steps: np.ndarray) -> int | None:
-        """Return the width of a counter that wrapped where a step is no motion; None if none explains it."""
-        if next(_jumps(steps, self._gaps), None) is None:
+        """Return the range of a counter that wrapped where a step is no motion; None if none explains it."""
+        if next(_jumps(steps, self._gaps), None) is None and not self._too_fast(steps).any():
             return None
-        bits = int(self._spread[-1]).bit_length()
-        if bits not in WRAP_BITS:
-            return None
-        within = _modulo(self._counts, bits)
-        wraps = np.flatnonzero(within != steps)
-        if not len(wraps) or np.abs(within).max() > 1 << (bits - 2):
-            return None
-        usual, spread = _around(within, wraps)
-        near = np.maximum(spread, CLOSE * np.abs(within[within != 0]).min())
-        return bits if (np.abs(within[wraps] - usual) <= near).all() else None
+        span = int(self._spread[-1])
+        sizes = [] if self._turn is None else [self._turn]
+        sizes += [1 << span.bit_length()] if span.bit_length() in WRAP_BITS else []
+        return next((size for size in sizes if self._explains(size, steps)), None)
+
+    def _explains(self, size: int, steps: np.ndarray) -> bool:
+        """Return whether a counter of a range wrapped where some steps of the recording are no motion."""
+        within = _modulo(self._counts, size)
+        wraps = within != steps
+        if not wraps.any() or np.abs(within).max() > size // 4 or self._too_fast(within)[wraps].any():
+            return False
+        return not self._misfits(within, wraps, 1).size
+
+    def _misfits(self, within: np.ndarray, wraps: np.ndarray, spreads: int) -> np.ndarray:
+        """Return the steps across the end of a range which differ from those beside them by more than so many spreads,
+        and `CLOSE` of the smallest steps."""
+        places = np.flatnonzero(wraps & ~self._gaps)
+        if len(within) <= 2 * BESIDE or not len(places):
+            return places[:0]
+        usual, spread = _around(within, places)
+        near = np.maximum(spreads * spread, CLOSE * _smallest(within))
+        return places[np.abs(within[places] - usual) > near]
+
+    def _check_width(self, bits: int, steps: np.ndarray, wraps: np.ndarray) -> None:
+        """Raise RecordingError if a width that is given makes steps across the end of its range that do not fit."""
+        wrong = self._misfits(steps, wraps, JUMP)
+        if len(wrong):
+            usual, _ = _around(steps, wrong[:1])
+            raise RecordingError(
+                f"{self._where(wrong[0] + 1)}: the count must not go by {steps[wrong[0]]}, as a counter of {bits} bits "
+                f"that wrapped there, where {usual[0]:g} is usual beside it: correct --counter-bits, or leave it out"
+            )
+
+    @cached_property
+    def _gaps(self) -> np.ndarray:
+        """For every step, whether samples are missing there, so that it may be any."""
+        return self._passed > 1
+
+    def _too_fast(self, steps: np.ndarray) -> np.ndarray:
+        """Return for every step whether it goes over missing samples, and faster than all steps that do not."""
+        if self._gaps.all():
+            return ~self._gaps
+        return self._gaps & (np.abs(steps) > self._passed * np.abs(steps[~self._gaps]).max())
 
     def _check(self, steps: np.ndarray, may_stand: bool) -> np.ndarray:
         """Return the samples that a sensor that stood jumps to; raise RecordingError if another step is no motion."""
-        cuts = []
-        for place, usual, near in _jumps(steps, self._gaps):
-            stood = _stood(steps, place) > BESIDE
-            if may_stand and stood:
+        cuts, held = [], _held(steps)
+        for place, usual, spread in _jumps(steps, self._gaps):
+            if may_stand and held[place] > BESIDE:
                 cuts.append(place + 1)
                 continue
-            cure = _cure(self._counts, steps, place, steps[place] - usual, near)
             raise RecordingError(
                 f"{self._where(place + 1)}: the count must not go by {steps[place]} in one "
-                f"sample where {usual:g} is usual beside it, for no motion does that: {cure}"
+                f"sample where {usual:g} is usual beside it, for no motion does that: "
+                f"{self._cure(steps, place, steps[place] - usual, spread, int(held[place]))}"
             )
         return np.array(cuts, np.int64)
 
+    def _cure(self, steps: np.ndarray, place: int, off: float, spread: float, held: int) -> str:
+        """Return what has probably happened at a step that is `off` by so much, and what helps."""
+        count, cut, least = int(self._counts[place + 1]), "cut the recording at this line", _smallest(steps)
+        close = max(spread, CLOSE * least)
+        if self._turn is not None and abs(abs(off) - self._turn) <= close:
+            return "if the angle wrapped at a turn, unwrap it before: it is too fast here to tell its direction"
+        bits = next((bits for bits in WRAP_BITS if abs(abs(off) - 2.0**bits) <= close), None)
+        if bits is not None:
+            return f"if a counter of {bits} bits wrapped, give --counter-bits {bits}"
+        if abs(count) <= max(spread, FLOOR * least):
+            return f"if the counter was set to 0, add {-round(off)} in this line and all after it, or {cut}"
+        if held > BESIDE:
+            return (
+                f"if the sensor or its reading stood, for {held} samples before it, take it so (--gaps hold), or keep "
+                "the longest piece (--gaps split)"
+            )
+        return f"correct this line, or {cut}"
 
-def _modulo(counts: np.ndarray, bits: int) -> np.ndarray:
-    """Return the steps of counts of a counter of so many bits, each the shortest way."""
+
+def _modulo(counts: np.ndarray, size: int) -> np.ndarray:
+    """Return the steps of counts of a counter of a range, each the shortest way."""
     with np.errstate(over="ignore"):
         steps = np.diff(counts)
-        if bits == COUNTER_BITS[1]:
+        if size == 1 << COUNTER_BITS[1]:
             return steps
-        half = np.int64(1 << (bits - 1))
+        half = np.int64(size // 2)
+        if size & (size - 1):
+            return (steps + half) % np.int64(size) - half
         return ((steps + half) & (half - 1 + half)) - half
 
 
-def _stood(steps: np.ndarray, place: int) -> int:
-    """Return how many samples the count did not move before a step."""
-    moved = np.flatnonzero(steps[:place])
-    return place - (int(moved[-1]) + 1 if len(moved) else 0)
+def _smallest(steps: np.ndarray) -> float:
+    """Return the smallest magnitude of the steps that are not 0; 1 if all are."""
+    moved = np.abs(steps[steps != 0])
+    return float(moved.min()) if len(moved) else 1.0
+
+
+def _held(steps: np.ndarray) -> np.ndarray:
+    """Return for every step how many samples the count did not move before it."""
+    place = np.arange(len(steps))
+    moved = np.maximum.accumulate(np.where(steps != 0, place, -1))
+    return place - 1 - np.concatenate([[-1], moved[:-1]])
 
 
 def _jumps(steps: np.ndarray, gaps: np.ndarray) -> Iterator[tuple[int, float, float]]:
-    """Yield the number of every step that is no motion, the median of the steps beside it, and how much a step may be
-    off; nothing if there are too few steps to tell.
+    """Yield the number of every step that is no motion, and the median and the spread of the steps beside it; nothing
+    if there are too few steps to tell.
 
     Args:
         steps: the steps.
@@ -168,7 +249,7 @@ def _jumps(steps: np.ndarray, gaps: np.ndarray) -> Iterator[tuple[int, float, fl
     """
     if len(steps) <= 2 * BESIDE or not steps.any():
         return
-    least = FLOOR * float(np.abs(steps[steps != 0]).min())
+    least = FLOOR * _smallest(steps)
     # A jump differs from both its neighbours by nearly all that it is off: most steps are not looked at again.
     changes = np.abs(np.diff(steps))
     beside = np.concatenate([changes[:1], np.minimum(changes[1:], changes[:-1]), changes[-1:]])
@@ -178,7 +259,7 @@ def _jumps(steps: np.ndarray, gaps: np.ndarray) -> Iterator[tuple[int, float, fl
         usual, spread = _around(steps, places)
         near = JUMP * np.maximum(spread, least)
         for found in np.flatnonzero(np.abs(steps[places] - usual) > near):
-            yield int(places[found]), float(usual[found]), float(near[found])
+            yield int(places[found]), float(usual[found]), float(spread[found])
 
 
 def _around(steps: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -196,20 +277,3 @@ def _around(steps: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarr
     at_an_end = first != places - BESIDE
     spread = np.where(at_an_end, np.abs(values).max(axis=1), values.max(axis=1) - values.min(axis=1))
     return usual, spread
-
-
-def _cure(counts: np.ndarray, steps: np.ndarray, place: int, off: float, near: float) -> str:
-    """Return what has probably happened at a step that is `off` by so much, and what helps."""
-    count, cut = int(counts[place + 1]), "cut the recording at this line"
-    bits = next((bits for bits in WRAP_BITS if abs(abs(off) - 2.0**bits) <= near / JUMP), None)
-    if bits is not None:
-        return f"if a counter of {bits} bits wrapped, give --counter-bits {bits}"
-    if abs(count) <= near / JUMP:
-        return f"if the counter was set to 0, add {-round(off)} in this line and all after it, or {cut}"
-    held = _stood(steps, place)
-    if held > BESIDE:
-        return (
-            f"if the sensor or its reading stood, for {held} samples before it, take it so (--gaps hold), or keep the "
-            "longest piece (--gaps split)"
-        )
-    return f"correct this line, or {cut}"

@@ -112,5 +112,5 @@ class Arrays(Table):
 
 
 def of_numbers(values: np.ndarray) -> Cells:
-    """Return numbers and times as they are, and everything else as texts."""
-    return values if values.dtype.kind in "iufbM" else [str(value) for value in values.tolist()]
+    """Return numbers, times and durations as they are, and everything else as texts."""
+    return values if values.dtype.kind in "iufbMm" else [str(value) for value in values.tolist()]

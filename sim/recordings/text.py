@@ -12,14 +12,16 @@ from pathlib import Path
 from typing import BinaryIO
 
 from ...model.runtime.regular_file import opened
-from .dialect import COMMENT, Dialect, dialect_of
+from .dialect import COMMENT, Dialect, dialect_of, is_above
 from .error import ACCEPTED, RecordingError
 from .table import CHUNK, Chunk, Table
 
 BYTES_MAX = 16 * 10**9
 LINE_MAX = 1 << 20
 FIRST_LINES = 200
-"""The lines by which a dialect is told."""
+"""The rows by which a dialect is told."""
+ABOVE_MAX = 10**5
+"""The most comments and blank lines before the first row: they are in memory."""
 GZIP = b"\x1f\x8b"
 
 
@@ -39,13 +41,8 @@ class Text(Table):
 
     def __init__(self, name: str, path: str | Path, progress: Callable[[int], None] | None = None):
         self.name, self._path, self._progress = name, path, progress
-        first = []
-        for line in self._lines(CHUNK):
-            first.append(line)
-            if len(first) == FIRST_LINES:
-                break
         try:
-            dialect = dialect_of(first)
+            dialect = dialect_of(self._first())
         except csv.Error as error:
             raise RecordingError(f"{name}: is not CSV ({error}); must be {ACCEPTED}") from None
         if dialect is None:
@@ -53,6 +50,18 @@ class Text(Table):
         self.dialect: Dialect = dialect
         self.names, self.width, self.rate_hz = dialect.names, dialect.width, dialect.rate_hz
         self.head, self.form = self.at(dialect.named_by or 1), dialect.form
+
+    def _first(self) -> list[str]:
+        """Return the lines before the first row, and some behind."""
+        first, rows = [], 0
+        for line in self._lines(CHUNK):
+            first.append(line)
+            rows += not is_above(line)
+            if rows == FIRST_LINES:
+                break
+            if not rows and len(first) == ABOVE_MAX:
+                raise RecordingError(f"{self.name}: must have a row of data within its first {ABOVE_MAX} lines")
+        return first
 
     def chunks(self, places: Sequence[int]) -> Iterator[Chunk]:
         lines: list[int] = []

@@ -2,7 +2,7 @@
 
 The resolution of a time stamp is
 
-    unit = the coarsest of: its last printed decimal place, the spacing of float64 there, 1e-12 of the whole time
+    unit = the coarsest of: its last printed decimal place, the spacing of floating point there, 1e-12 of the whole time
 
 and a stamp that was rounded to nearest is off by at most half a unit. So if the samples are equally spaced
 
@@ -16,7 +16,7 @@ is given, all intervals must be printed alike.
 
 Whole numbers that are 1 or more apart in a column `time_s` may be seconds, or milliseconds, microseconds or
 nanoseconds: a rate or `--time-unit` must be given with them. A rate that is given with a column of another name, which
-was not asked for, must be its mean rate, within `MEAN`. The rate of float64 times is rounded to 12 digits, which is
+was not asked for, must be its mean rate, within `MEAN`. The rate of floating-point times is the roundest number within
 their resolution.
 """
 
@@ -25,7 +25,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .error import RecordingError
-from .gaps import USUAL
+from .gaps import passed_in
 from .recording import RATE_MAX_HZ, RATE_MIN_HZ
 from .stamps import UNITS, Times
 from .table import Table
@@ -33,7 +33,8 @@ from .time_column import TIME_COLUMN, TimeColumn, place_of
 
 MEAN = 0.01
 """How far the mean rate of a column of another name may be from the rate that is given, as a part of it."""
-FLOAT_DIGITS = 12
+FLOAT_DIGITS = 17
+"""The digits that tell every float64 apart."""
 
 
 def check_mean(name: str, column: str, unit: str | None, mean: float, rate_hz: float) -> None:
@@ -94,9 +95,7 @@ class Sampled:
             raise RecordingError(
                 f"{at} increase, not go by {steps.min():g} s: cut the recording at this line{self._twice()}"
             )
-        largest = max(abs(float(times.first)), abs(float(times.last)))
-        floats = max(float(np.spacing(largest)), 1e-12 * since[-1])
-        unit = floats if times.decimals is None else max(10.0**-times.decimals, floats)
+        unit = times.resolution
         mean_s = since[-1] / samples[-1]
         if given_hz is not None:
             self._check_given(given_hz, unit, 1 / mean_s)
@@ -113,9 +112,8 @@ class Sampled:
         if in_doubt:
             self._check_seconds(mean_s)
         self._check_uniform(np.abs(since - samples * mean_s), unit)
-        if times.decimals is None or 10.0**-times.decimals < floats:
-            return float(f"{rate_hz:.{FLOAT_DIGITS}g}")
-        return float(rate_hz)
+        floating = times.decimals is None or 10.0**-times.decimals < times.rounding
+        return _roundest(float(rate_hz), times.rounding / float(since[-1])) if floating else float(rate_hz)
 
     def _check_seconds(self, mean_s: float) -> None:
         """Raise RecordingError for whole numbers that may be of another unit than seconds."""
@@ -140,7 +138,7 @@ class Sampled:
             raise RecordingError(
                 f"{self._at(off[0])} agree with the rate {given_hz:g} Hz within {unit:g} s, not be "
                 f"{since[off[0]]:g} s after the first at sample {samples[off[0]]} (over all: {mean_hz:g} Hz): "
-                f"{self._cure(given_hz)}"
+                f"{self._cure(given_hz, True)}"
             )
 
     def _check_uniform(self, off: np.ndarray, unit: float) -> None:
@@ -158,18 +156,26 @@ class Sampled:
         worst = int(np.argmax(uneven))
         raise RecordingError(
             f"{self._at(worst + 1)} be uniform within {unit:g} s, not go by "
-            f"{self._steps[worst]:g} s where {usual_s:g} s is usual: {self._cure(1 / mean_s)}"
+            f"{self._steps[worst]:g} s where {usual_s:g} s is usual: {self._cure(1 / mean_s, False)}"
         )
 
-    def _cure(self, rate_hz: float) -> str:
+    def _cure(self, rate_hz: float, given: bool) -> str:
         """Return what helps against intervals that are not those of a rate."""
-        steps = self._steps / np.diff(self._numbers)
-        usual_s, mean_s = float(np.median(steps)), float(np.mean(steps))
-        if steps.max() >= USUAL * usual_s:
+        unit, steps = self._times.resolution, self._steps / np.diff(self._numbers)
+        if (passed_in(steps, unit, rate_hz if given else None) > 1).any():
             return (
                 "if samples are missing there, fill them with the count before (--gaps hold), or keep the longest "
                 "piece (--gaps split)"
             )
+        mean_s = float(np.mean(steps))
         if abs(mean_s * rate_hz - 1) > MEAN:
             return "correct the rate"
+        if mean_s < 2 * unit and not given:
+            return f"give the rate (--rate {rate_hz:.6g}), for stamps as coarse as these do not tell it"
         return f"if only the stamps jitter, give --time none --rate {rate_hz:.6g}, or write them evenly"
+
+
+def _roundest(value: float, part: float) -> float:
+    """Return the number with the fewest digits that differs from a value by no more than a part of it."""
+    rounded = (float(f"{value:.{digits}g}") for digits in range(1, FLOAT_DIGITS))
+    return next((each for each in rounded if abs(each - value) <= part * value), value)

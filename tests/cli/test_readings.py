@@ -99,6 +99,23 @@ def test_options_that_are_refused(monkeypatch, capsys, folder, words, said):
     assert said in err
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--rate", "1000"], "--rate must be absent without a recording: the rates of known motions are --rates"),
+        (["--rate", "1000", "--rates", "1e4"], "--rate must be absent without a recording"),
+        (["--gaps", "hold", "--counter-bits", "16"], "--counter-bits, --gaps must be absent without a recording"),
+        (["--signal", "hit", "--channels", "A,B"], "--channels must be absent without a recording"),
+        (["--unit", "rad", "--count", "0.1"], "--unit, --count must be absent without a recording"),
+    ],
+)
+def test_accuracy_refuses_options_of_a_recording_without_one(monkeypatch, capsys, folder, words, said):
+    """They were taken, and changed nothing."""
+    code, out, err = call(monkeypatch, capsys, "accuracy", *words)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert said in err
+
+
 def test_without_the_extra_a_file_that_needs_it_names_it(monkeypatch, capsys, folder):
     (folder / "log.parquet").write_bytes(b"PAR1" + bytes(50))
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)

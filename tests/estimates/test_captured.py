@@ -1,5 +1,7 @@
 """Captures through an axis: the words of every backend, the clock, the reference, and what stamps are worth."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -51,6 +53,16 @@ def test_counts_at_the_strobes_are_the_recorded_counts():
     """The plain difference, through pins on `rtl` and from counts on `fixed`, has the same words."""
     made = recording(MADE)
     assert replay(made, "fdm", backend="rtl").velocity_sha256 == replay(made, "fdm").velocity_sha256
+
+
+@pytest.mark.parametrize(("rate_hz", "sample", "tick"), [(1000.0, 2007, 2_007_000), (10_000.0, 51, 5100)])
+def test_an_edge_at_the_time_of_a_sample_is_seen_at_it(rate_hz, sample, tick):
+    """In float64 such an edge is a part in 10^16 late: a clock later, its sample would not see it."""
+    assert np.ceil(tick / 1e6 * rate_hz * 1024) > sample * 1024
+    edges = EdgeRecord(1e6, np.array([tick - 2 * 1_000_000 // int(rate_hz), tick]), np.array([1, 2]), 0)
+    made = Recording("made.sr", "A,B", counts_at(edges, rate_hz, sample + 40), rate_hz, edges=edges)
+    seen = replay(made, "period", acceleration_max_counts_per_s2=1e6).velocity_counts_per_s
+    assert int(np.flatnonzero(seen)[0]) == sample
 
 
 def test_real_stamps_are_worth_more_than_edges_that_are_spread():
@@ -118,6 +130,15 @@ def test_a_capture_shorter_than_a_second_is_judged_after_its_first_quarter():
     assert replay(recording(MADE), "fdm").judged_from == 375
 
 
+@pytest.mark.parametrize("seconds", [0.9, 1.1])
+def test_the_bound_of_a_capture_is_that_of_its_judged_samples(seconds):
+    """The swing accelerates most at its turn, at 0.71 s: a bound from what follows the first second is too small."""
+    made = recording(swing(seconds, 5000.0, 0.7), seconds=seconds)
+    found = replay(made, "fdm")
+    acceleration = np.abs(np.gradient(found.reference_counts_per_s) * made.rate_hz)[found.judged_from :]
+    assert acceleration.max() <= found.acceleration_max_counts_per_s2 <= 1.1 * acceleration.max()
+
+
 def test_a_capture_without_edges_is_at_rest():
     none = EdgeRecord(1e6, np.zeros(0, np.int64), np.zeros(0, np.int64), 0)
     found = replay(Recording("made.sr", "A,B", np.zeros(500, int), 1000.0, edges=none), "period")
@@ -137,3 +158,12 @@ def test_slow_edges_are_a_motion_at_any_rate(estimator, rate_hz):
         # Half an LSB, and two edges that are each a sample late at most.
         lsb = seen.spec.design.estimator.velocity.lsb * rate_hz
         assert np.abs(judged - 4.0).max() <= 0.5 * lsb + 4.0 * 2 * 4.0 / rate_hz
+
+
+def test_a_rate_too_low_for_the_ticks_of_a_capture_is_refused_by_the_file():
+    """The message named a rate of the scene, which a replay does not have."""
+    edges = EdgeRecord(1e9, np.arange(1, 40) * 10**8, np.arange(1, 40), 0)
+    with pytest.raises(ReplayError) as error:
+        replay(recording(edges, 0.5, 8.0), "period")
+    said = r"made\.sr, column A,B: period cannot take this capture at 0\.5 Hz, for a sample has too many ticks .*: "
+    assert re.fullmatch(said + r"give a higher rate \(--rate\)", str(error.value))

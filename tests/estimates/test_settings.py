@@ -1,8 +1,11 @@
 """Settings of a replay: gains, jerk and edge error by their keys, in counts and seconds, and those that are refused."""
 
+from dataclasses import replace
+
 import pytest
 
 from hardwall.model.estimators.registry import ESTIMATORS
+from hardwall.model.record_axis import DECODER_CLOCKS
 from hardwall.sim.estimates.replay import replay
 from hardwall.sim.estimates.replay_plan import ArgumentError
 from hardwall.sim.estimates.settings import SettingError, Settings, names_of, settings_of
@@ -59,11 +62,52 @@ def test_no_gain_of_a_replay_is_in_metres():
 )
 def test_settings_that_are_refused(changes, said):
     with pytest.raises(SettingError) as error:
-        settings_of(changes, "levant")
+        settings_of(changes, "edge-kalman" if "max" in min(changes) else "levant")
     assert said in str(error.value)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_a_bound_that_sets_no_gain_of_an_estimator_is_refused(estimator):
+    """It was taken, and changed nothing."""
+    spec = replay(swing(), estimator, coarsen=COARSEN, acceleration_max_counts_per_s2=BOUND).spec
+    for name, field in (
+        ("jerk_max_counts_per_s3", "jerk_max_m_per_s3"),
+        ("edge_error_max_counts", "edge_error_max_counts"),
+    ):
+        gains = [replace(spec, **{field: value}).design.gains for value in (1e-3, 1e-2)]
+        changes = {f"controller.{name}": 1e-3}
+        if gains[0] != gains[1]:
+            assert getattr(settings_of(changes, estimator), name) == 1e-3
+        else:
+            with pytest.raises(SettingError, match=f"is not a key of a replay with {estimator}, which has "):
+                settings_of(changes, estimator)
+
+
+def test_a_bound_beside_the_gains_that_it_would_set_is_refused():
+    changes = {f"controller.gains.edge-kalman.{name}": 0.5 for name in names_of("edge-kalman")}
+    assert len(settings_of(changes, "edge-kalman").gains) == len(changes)
+    with pytest.raises(SettingError, match=r"^controller\.edge_error_max_counts must be absent beside the gains"):
+        settings_of(changes | {"controller.edge_error_max_counts": 0.5}, "edge-kalman")
+
+
+def test_an_estimator_without_gains_has_no_keys():
+    with pytest.raises(SettingError, match=r"is not a key of a replay with fdm, which has none$"):
+        settings_of({"controller.gains.fdm.x": 1.0}, "fdm")
 
 
 def test_gains_that_no_axis_has_are_refused():
     settings = Settings({"lambda_sqrt_counts_per_s": 1e-15, "alpha_counts_per_s2": 1e15})
     with pytest.raises(ArgumentError, match=r"^settings must give an axis \(as if 1024 samples were a second\): "):
         replay(swing(), settings=settings)
+
+
+@pytest.mark.parametrize(
+    ("estimator", "gain", "factor"), [("levant", "lambda_sqrt_counts_per_s", 0.125), ("least-squares", "window_s", 8.0)]
+)
+def test_a_sample_has_clocks_for_the_longer_path_of_given_gains(estimator, gain, factor):
+    """The clocks of a sample were chosen for the derived gains, before whose drive no edge of the next sample came."""
+    derived = replay(swing(), estimator, None, "fixed", COARSEN, BOUND)
+    gains = {name: value * (factor if name == gain else 1) for name, value in derived.gains.items()}
+    spec = replay(swing(), estimator, None, "fixed", COARSEN, BOUND, settings=Settings(gains)).spec
+    needed = spec.design.latency_to_drive + DECODER_CLOCKS
+    assert derived.spec.clocks_per_sample < needed <= spec.clocks_per_sample

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scipy.io
 
+from hardwall.sim.recordings import arrays
 from stimuli.forms import COUNTS, SIZE_RAD
 
 TIMES = np.arange(500) / 1000
@@ -130,3 +131,60 @@ def test_archives_of_other_files_are_refused(refused):
         with zipfile.ZipFile(file, "w") as archive:
             archive.writestr(member, "1")
         assert said in refused(file.getvalue(), file="spindle.zip")
+
+
+def npy(array):
+    file = io.BytesIO()
+    np.save(file, array)
+    return file.getvalue()
+
+
+@pytest.mark.parametrize("shape", [(), (3, 4, 5), (1, 1, 1, 1)])
+def test_an_array_of_other_dimensions_is_refused(refused, shape):
+    said = refused(npy(np.zeros(shape)), "1", rate_hz=1000, file="spindle.npy")
+    assert said.endswith(f"must be an array of 1 or 2 dimensions, not {len(shape)}")
+
+
+@pytest.mark.parametrize("kind", ["datetime64[ms]", "timedelta64[ns]", "timedelta64[us]"])
+@pytest.mark.parametrize(("unit", "what"), [("counts", "counts"), ("rad", "values in rad")])
+def test_times_are_no_counts(refused, kind, unit, what):
+    content = npz(counts=np.arange(10).astype(kind))
+    size = {"count": 0.1} if unit == "rad" else {}
+    said = refused(content, rate_hz=1000, file="spindle.npz", unit=unit, **size)
+    assert said.endswith(f"column counts: must have {what}, not times")
+
+
+@pytest.mark.parametrize("kind", ["ns", "us", "ms"])
+def test_durations_are_times(read, kind):
+    times = (np.arange(500) * np.timedelta64(1, "ms")).astype(f"timedelta64[{kind}]")
+    found = read(npz(time_ms=times, counts=COUNTS), file="spindle.npz")
+    assert found.rate_hz == 1000.0
+    assert "times in column time_ms (s), 1000 Hz" in found.notes
+
+
+@pytest.mark.parametrize(("form", "file"), [(npz, "spindle.npz"), (mat, "spindle.mat"), (npy, "spindle.npy")])
+def test_files_that_would_fill_the_memory_are_refused(read, refused, monkeypatch, form, file):
+    """Of a compressed file, what it unpacks to counts."""
+    columns = {} if form is npy else {"counts": COUNTS, "time_s": TIMES}
+    content = npy(COUNTS) if form is npy else form(**columns)
+    size = COUNTS.nbytes if form is npy else len(content) if form is mat else 2 * (128 + COUNTS.nbytes)
+    for most in (size, size - 1):
+        monkeypatch.setattr(arrays, "BYTES_MAX", most)
+        how = {"column": "1" if form is npy else "counts", "file": file, "rate_hz": 1000.0}
+        if most == size:
+            assert (read(content, **how).counts == COUNTS).all()
+        else:
+            assert f"cannot be read (it has more than {most / 1e6:g} MB)" in refused(content, **how)
+
+
+@pytest.mark.parametrize(("form", "file"), [(npz, "spindle.npz"), (mat, "spindle.mat"), (npy, "spindle.npy")])
+def test_columns_are_bounded(read, refused, monkeypatch, form, file):
+    monkeypatch.setattr(arrays, "COLUMNS_MAX", 2)
+    table = np.column_stack([COUNTS, COUNTS + 1, COUNTS + 2])
+    names = ("1", "2", "3") if form is npy else ("x.1", "x.2", "x.3")
+    content = npy(table) if form is npy else form(x=table)
+    if form is mat:  # read by a process of its own, which has the true bound
+        content = form(x=np.tile(np.arange(1200)[:, None], 1001))
+        names = ("x.1", "x.1000", "x.1001")
+    assert len(read(content, names[1], 1000.0, file=file).counts) >= 500
+    assert "column must be " in refused(content, names[2], 1000.0, file=file)

@@ -58,6 +58,9 @@ def test_channels_in_doubt_are_asked_for(channels, wanted, said):
         ("fast", None),
         ("0", None),
         ("1.2.3", None),
+        ("999 GHz", 999e9),
+        ("1000 GHz", None),
+        ("1e-3", 1e-3),
     ],
 )
 def test_rates_in_words(text, rate):

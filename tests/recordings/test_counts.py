@@ -72,3 +72,15 @@ def test_counts_of_64_bits_need_their_width(read, refused):
     found = read(lines, header="t,counts", time="none", rate_hz=10, counter_bits=64)
     assert np.diff(found.counts).tolist() == [3] * 19
     assert refused([f"0,{top}", "1,0"], rate_hz=1).endswith("for a counter of 64 bits, say so (--counter-bits 64)")
+
+
+@pytest.mark.parametrize("off", [0.09, -0.09, 0.11, -0.11])
+def test_a_tenth_of_a_count_is_as_far_as_a_value_may_be_off(read, refused, off):
+    lines = ["0", "2.5", f"{5 + 2.5 * off}", "7.5"]
+    text = "\n".join(["x", *lines])
+    if abs(off) < 0.1:
+        assert read(text, "x", rate_hz=1, unit="deg", count=2.5).counts.tolist() == [0, 1, 2, 3]
+    else:
+        assert "line 4, column x: values must be multiples of 2.5 deg (--count)" in refused(
+            text, "x", rate_hz=1, unit="deg", count=2.5
+        )

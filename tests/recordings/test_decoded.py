@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hardwall.sim.recordings.capture import Changes
-from hardwall.sim.recordings.decoded import counts_at, edges_of
+from hardwall.sim.recordings.capture import Capture, Changes
+from hardwall.sim.recordings.decoded import counts_at, edges_of, recording_of
 from hardwall.sim.recordings.error import RecordingError
 from hardwall.sim.recordings.recording import EdgeRecord
 from stimuli.forms import TICK_HZ, edges, saleae, samples, session, sigrok_csv, vcd, waveforms
@@ -81,6 +81,23 @@ def test_an_edge_at_the_time_of_a_sample_is_counted_there():
         assert exact.tolist() == list(range(50))
 
 
+@pytest.mark.parametrize(("rate", "last"), [(1000.0, 1001), (10_000.0, 3), (48_000.0, 54)])
+def test_a_sample_at_the_end_of_the_capture_is_one_of_it(rate, last):
+    """In float64 the end is a part in 10^16 before such a sample."""
+    end = round(last * TICK_HZ / rate)
+    assert end / TICK_HZ * rate < last
+
+    class Made(Capture):
+        name, form, channels = "made", "made", ["A", "B"]
+
+        def changes(self, places):
+            return Changes(float(TICK_HZ), np.array([1, end]), np.array([1, 3]), 0, end)
+
+    found = recording_of(Made(), "made", (), rate)
+    assert len(found.counts) == last + 1
+    assert found.counts[-1] == 2
+
+
 def test_the_index_is_said(read):
     levels = samples()
     lines = [f"{level & 1},{level >> 1},{int(20_000 <= k < 20_100)}" for k, level in enumerate(levels)]
@@ -97,7 +114,11 @@ def test_the_index_is_said(read):
         ({"rate_hz": 1.0}, "must give 2 to 10000000 samples at 1 Hz, not 1: correct the rate"),
         ({"rate_hz": 10.0, "column": "A"}, "is a capture of edges, which has no column: name its channels"),
         ({"rate_hz": 10.0, "channels": ("1", "1")}, "A, B and Z must be different channels, not A, A"),
-        ({"rate_hz": 10.0, "unit": "rad"}, "so --unit and --counter-bits must be absent"),
+        ({"rate_hz": 10.0, "unit": "rad"}, "is a capture of edges, so --unit must be absent"),
+        ({"rate_hz": 10.0, "counter_bits": 16}, "is a capture of edges, so --counter-bits must be absent"),
+        ({"rate_hz": 10.0, "gaps": "hold", "count": 2.0}, "so --count and --gaps must be absent"),
+        ({"rate_hz": 10.0, "time": "t"}, "is a capture with times of its own, so --time must be absent"),
+        ({"rate_hz": 10.0, "time_unit": "s"}, "is a capture with times of its own, so --time-unit must be absent"),
     ],
 )
 def test_what_a_capture_needs(refused, arguments, said):

@@ -65,7 +65,18 @@ def test_a_comment_of_sigrok_names_columns_that_are_logic():
     assert dialect_of(said).names == ["one", "two"]
 
 
-@pytest.mark.parametrize(("text", "rate"), [("1e+06Hz", 1e6), ("100 kHz", 1e5), ("250Hz", 250.0), ("fast", None)])
+@pytest.mark.parametrize(
+    ("text", "rate"),
+    [
+        ("1e+06Hz", 1e6),
+        ("100 kHz", 1e5),
+        ("250Hz", 250.0),
+        ("fast", None),
+        ("0 Hz", None),
+        ("1.2.3 MHz", None),
+        ("1e400 Hz", None),
+    ],
+)
 def test_a_comment_may_state_the_rate(text, rate):
     assert dialect_of([f"#Sample rate: {text}", "A,B", "0,1"]).rate_hz == rate
 
@@ -73,3 +84,28 @@ def test_a_comment_may_state_the_rate(text, rate):
 def test_files_of_nothing_have_no_dialect():
     assert dialect_of([]) is None
     assert dialect_of(["", "# a comment"]) is None
+
+
+@pytest.mark.parametrize(
+    ("lines", "names"),
+    [
+        (["0.000,1,ok", "0.001,2,ok"], []),
+        (["0,1,ok", "1,2,late"], []),
+        (["0.000,start,1", "0.001,2,2"], []),
+        (["-1,start", "2,3"], []),
+        (["2024-05-01T12:00:00,start", "2024-05-01T12:00:01,2"], []),
+        (["---,1", "2,3"], []),
+        (["n/a;1", "2;3"], []),
+        (["0 ? 3", "1 2 4"], []),
+        (["x,1", "5,6"], ["x", "1"]),
+        (["x,1,note", "5,6,ok"], ["x", "1", "note"]),
+        (["x,1,note", "5,6,"], ["x", "1", "note"]),
+        (["x,note", "5,ok"], ["x", "note"]),
+        (["x,1"], ["x", "1"]),
+        (["a b 3", "1 2 4"], ["a", "b", "3"]),
+    ],
+)
+def test_a_row_with_a_text_is_no_line_of_names(lines, names):
+    """The first row of a log with a column of texts was taken for names, and lost."""
+    assert dialect_of(lines).names == names
+    assert dialect_of(lines).skipped == (1 if names else 0)

@@ -1,6 +1,7 @@
 """Recordings: their counts and rates, and one line for every fault that says where it is and what is accepted."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from hardwall.sim.recordings import load as load_module
 from hardwall.sim.recordings import text
 from hardwall.sim.recordings.error import RecordingError
 from hardwall.sim.recordings.load import load
+from hardwall.sim.recordings.recording import EdgeRecord, Recording
 
 GOOD = ["0.000,5", "0.001,6", "0.002,4", "0.003,4"]
 
@@ -168,6 +170,37 @@ def test_samples_and_bytes_are_bounded(refused, monkeypatch):
     assert "line 5: must have at most 3 samples (data lines)" in refused(GOOD)
     monkeypatch.setattr(text, "BYTES_MAX", 20)
     assert "cannot be read (it has more than 2e-05 MB of text)" in refused(GOOD)
+
+
+def test_the_digest_is_of_all_that_a_replay_depends_on():
+    """Stored results of a recording are found by it."""
+    edges = EdgeRecord(1e6, np.array([5, 9]), np.array([1, 2]), 0)
+    made = Recording("made.csv", "counts", np.array([0, 1, 2]), 1000.0, 0.5, edges)
+    others = [
+        replace(made, counts=np.array([0, 1, 3])),
+        replace(made, rate_hz=1001.0),
+        replace(made, start_s=0.25),
+        replace(made, edges=None),
+        *(
+            replace(made, edges=replace(edges, **change))
+            for change in ({"tick_hz": 2e6}, {"ticks": np.array([5, 8])}, {"counts": np.array([-1, 0])}, {"start": 1})
+        ),
+    ]
+    assert len({each.content for each in (made, *others)}) == 1 + len(others)
+    for each in (made, others[3]):
+        same = replace(each, file="other.csv", column="x", counts=each.counts.astype(np.int16), notes=("said",))
+        assert same.content == each.content
+
+
+def test_what_a_file_has_no_use_for_is_refused(refused):
+    """Such options were taken, and changed nothing."""
+    assert refused(GOOD, channels=("A", "B")).endswith("is read as counts (--column), so --channels must be absent")
+    for content in ("counts\n1\n2\n", "time_s,counts\n0,1\n1,2\n"):
+        said = refused(content, rate_hz=1, time="none", time_unit="ms")
+        assert said.endswith("is read without times, so --time-unit must be absent")
+    levels = "; Samplerate: 1 MHz\nA,B\n0,0\n1,0\n"
+    assert refused(levels, None, 1.0, time_unit="s").endswith("is read without times, so --time-unit must be absent")
+    assert refused(levels, None, 1.0, gaps="hold").endswith("is a capture of edges, so --gaps must be absent")
 
 
 @pytest.mark.parametrize("name", ["davinci_L2_02.csv", "davinci_L2_22.csv", "davinci_R5_42.csv"])

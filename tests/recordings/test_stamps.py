@@ -1,5 +1,7 @@
 """Times as files give them: exact decimals, float64 printed in full, ISO timestamps, and units."""
 
+import io
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,12 @@ from hardwall.sim.recordings.table import Arrays
 from stimuli.forms import COUNTS, angles, rows
 
 TABLE = Arrays("made.npz", "arrays", {"t": np.zeros(2)})
+
+
+def npz(**arrays):
+    file = io.BytesIO()
+    np.savez(file, **arrays)
+    return file.getvalue()
 
 
 def whole(cells, unit="s"):
@@ -96,3 +104,65 @@ def test_a_time_that_is_none_is_refused(refused):
     assert "column t: a time must be a number of ms of" in refused(
         ["0,1", "x,2"], header="t,counts", time="t", time_unit="ms"
     )
+
+
+@pytest.mark.parametrize("text", ["9500000000000000000", "9.5e18", "-9500000000000000000", "930000000000000000000.5"])
+def test_nanoseconds_beyond_64_bits_are_refused(refused, text):
+    """They ended in a traceback."""
+    said = "line 2, column time: a time must be a number of ns of -9e+18 to 9e+18, not"
+    assert said in refused([f"{text},1", f"{text},2"], header="time,counts", time_unit="ns")
+
+
+def test_whole_nanoseconds_of_arrays_reach_as_far_as_those_of_texts(read, refused):
+    """Those since 1970 are beyond 1e18, which was the limit."""
+    for start in (1_700_000_000_000_000_000, 8_900_000_000_000_000_000):
+        times = start + np.arange(500) * 1_000_000
+        for kind in (np.int64, np.uint64):
+            found = read(npz(t=times.astype(kind), counts=COUNTS), file="spindle.npz", time_unit="ns")
+            assert (found.rate_hz, found.start_s) == (1000.0, start / 1e9)
+    beyond = np.uint64(9_500_000_000_000_000_000) + np.arange(500).astype(np.uint64)
+    said = "row 1, column t: a time must be a number of ns of -9e+18 to 9e+18, not '9500000000000000000'"
+    assert said in refused(npz(t=beyond, counts=COUNTS), file="spindle.npz", time_unit="ns")
+
+
+def test_timestamps_beyond_nanoseconds_of_64_bits_are_refused(refused):
+    """They wrapped, to a time of another century."""
+    times = np.arange(500).astype("datetime64[s]") + 10**13
+    assert "row 1, column t: a time must be as 2024-05-01T12:00:00.123, not '318857-" in refused(
+        npz(t=times, counts=COUNTS), file="spindle.npz"
+    )
+
+
+@pytest.mark.parametrize("kind", [float, int])
+def test_numbers_are_no_timestamps(refused, kind):
+    """With the unit of timestamps they were taken for seconds."""
+    times = (np.arange(500) + 3).astype(kind)
+    said = "row 1, column t: a time must be as 2024-05-01T12:00:00.123, not '3"
+    assert said in refused(npz(t=times, counts=COUNTS), file="spindle.npz", time_unit="iso")
+
+
+@pytest.mark.parametrize(("kind", "own"), [("datetime64[ms]", "iso"), ("timedelta64[ms]", "s")])
+@pytest.mark.parametrize("capture", [False, True])
+def test_times_with_a_unit_of_their_own_have_no_other(read, refused, kind, own, capture):
+    number = np.arange(500)
+    columns = {"A": number // 2 % 2, "B": (number + 1) // 2 % 2} if capture else {"counts": COUNTS}
+    how = {"column": None if capture else "counts", "rate_hz": 1000.0, "file": "spindle.npz", "time": "t"}
+    content = npz(t=number.astype(kind), **columns)
+    assert "column t: its times have a unit, so --time-unit must be absent, not ms" in refused(
+        content, time_unit="ms", **how
+    )
+    assert read(content, time_unit=own, **how).rate_hz == 1000.0
+
+
+def test_timestamps_have_nanoseconds_and_no_more():
+    digits = "123456789", "123456790", "1234567919", "12345679"
+    times = whole([f"2024-05-01T12:00:00.{each}" for each in digits], "iso")
+    assert times.since.tolist() == [0.0, 1e-9, 2e-9, 1e-9]
+    assert times.decimals == 9
+
+
+def test_the_first_row_of_a_text_without_names_may_have_a_timestamp(read):
+    lines = [f"2024-05-01T12:00:{k / 1000:06.3f},{count}" for k, count in enumerate(COUNTS)]
+    found = read("\n".join(lines), "2", time="1")
+    assert (found.counts == COUNTS).all()
+    assert found.rate_hz == 1000.0

@@ -56,3 +56,18 @@ def test_chunks_join_at_their_ends(read, monkeypatch):
 def test_a_row_with_other_cells_is_refused_by_its_line(refused):
     assert "line 3: must have 2 cells as the first, not 3" in refused("1,2\n3,4\n5,6,7\n", "1", rate_hz=1)
     assert "line 3: must have 2 cells as the header, not 1" in refused("a b\n3 4\n5\n", "a", rate_hz=1)
+
+
+def test_any_number_of_comments_may_stand_before_the_first_row(read, refused, monkeypatch):
+    """With 200 of them, the file was said to be empty."""
+    comments = "# a remark\n\n" * 300
+    assert (read(comments + TEXT).counts == COUNTS).all()
+    assert (read(comments + "# time_s,counts\n" + "\n".join(rows())).counts == COUNTS).all()
+    monkeypatch.setattr(module, "ABOVE_MAX", 599)
+    assert "must have a row of data within its first 599 lines" in refused(comments + TEXT)
+
+
+def test_a_text_in_the_first_row_costs_no_sample(read):
+    lines = [f"{row},{'moves' if k % 7 else 'rests'}" for k, row in enumerate(rows())]
+    found = read("\n".join(lines), "2", time="1", time_unit="s")
+    assert (found.counts == COUNTS).all()

@@ -61,3 +61,13 @@ def test_a_rate_must_agree_with_times_that_were_asked_for(read, refused):
     assert "line 9, column time: times must agree with the rate 200 Hz within 0.001 s" in refused(
         lines, rate_hz=200, header="time,counts", time="time"
     )
+
+
+@pytest.mark.parametrize(
+    ("apart", "rate", "unit"), [(500, 2.0, "ms"), (500, 2000.0, "us"), (20, 5e7, "ns"), (4, 0.25, "s")]
+)
+def test_a_rate_that_is_given_tells_the_unit(read, apart, rate, unit):
+    """Alone, times that are 500 apart would be those of 2 kHz, in us."""
+    found = read([f"{apart * k},{k}" for k in range(30)], header="when,counts", time="when", rate_hz=rate)
+    assert f"times in column when ({unit}), {rate:g} Hz" in found.notes
+    assert found.rate_hz == rate

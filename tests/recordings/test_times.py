@@ -1,5 +1,6 @@
 """The rate of a recording from its column of times, and times that are refused with what helps."""
 
+import io
 import re
 
 import numpy as np
@@ -121,3 +122,42 @@ def test_times_of_another_name_must_not_contradict_the_rate(refused, read, heade
 def test_columns_that_do_not_tell_of_time_may_hold_anything(read, header):
     assert read(["0,1", "0,2"], rate_hz=5, header=f"{header},counts").rate_hz == 5
     assert read(["noon,1", "later,2"], rate_hz=5, header="time,counts").rate_hz == 5
+
+
+@pytest.mark.parametrize("rate", [1000.0, 1024.0, 333.0, 12.5])
+@pytest.mark.parametrize(("kind", "samples"), [(np.float32, 20_000), (np.float32, 300), (np.float16, 200)])
+def test_the_spacing_of_times_is_that_of_their_own_numbers(read, rate, kind, samples):
+    """A program in single precision has times that are no multiples of an interval in float64."""
+    if kind == np.float16 and rate > 50:
+        pytest.skip("half precision does not tell these times apart")
+    file = io.BytesIO()
+    np.savez(file, time_s=(np.arange(samples) / rate).astype(kind), counts=np.arange(samples))
+    assert read(file.getvalue(), file="spindle.npz").rate_hz == rate
+
+
+@pytest.mark.parametrize("start", [0.0, 60.0, 1.7e9])
+@pytest.mark.parametrize("rate", [1000.0, 3000.0, 333.3, 0.125, 1 / 3])
+def test_the_rate_of_times_in_floating_point_is_a_round_number(read, rate, start):
+    times = start + np.arange(5000) / rate
+    file = io.BytesIO()
+    np.savez(file, time_s=times, counts=np.arange(5000))
+    found, part = read(file.getvalue(), file="spindle.npz").rate_hz, np.spacing(times[-1]) / (times[-1] - start)
+    assert abs(found / rate - 1) <= 2 * max(part, 1e-12)
+    if rate != 1 / 3:
+        assert found == rate
+
+
+@pytest.mark.parametrize(("off", "agrees"), [(0.0099, True), (-0.0099, True), (0.0101, False), (-0.0101, False)])
+def test_a_mean_rate_agrees_within_one_in_a_hundred(read, refused, off, agrees):
+    lines = [f"{k * (1 + off):.6f},{k}" for k in range(1000)]
+    if agrees:
+        assert read(lines, rate_hz=1, header="timestamp,counts").rate_hz == 1
+    else:
+        assert "times must agree with the rate 1 Hz within 1%" in refused(lines, rate_hz=1, header="timestamp,counts")
+
+
+def test_whole_seconds_are_seconds_where_a_unit_or_another_name_says_so(read, refused):
+    lines = stamped(range(20), "{}")
+    assert "may be of another unit" in refused(lines)
+    assert read(lines, time_unit="s").rate_hz == 1
+    assert read(lines, header="seconds,counts").rate_hz == 1

@@ -4,6 +4,7 @@ import sys
 
 import pytest
 
+from hardwall.sim.recordings import capture
 from hardwall.sim.recordings.vcd_file import Vcd
 from stimuli.forms import edges, vcd
 
@@ -66,3 +67,18 @@ def test_without_the_extra_its_module_is_named(read, monkeypatch):
     with pytest.raises(ModuleNotFoundError) as error:
         read(vcd(), None, 1000.0, file="spindle.vcd")
     assert error.value.name == "pyvcd"
+
+
+def test_of_several_changes_at_one_time_the_last_levels_count(read):
+    """A simulator writes the steps between two settled levels, too."""
+    plain = read(vcd(), None, 1000.0, file="spindle.vcd")
+    first, second = (edges()[0][place] + 100 for place in (0, 1))
+    noise = vcd().replace(f"#{first}\n", f"#{first}\n1!\n1#\n0!\n0#\n").replace(f"#{second}\n", f"#{second}\n0!\n1!\n")
+    assert noise != vcd()
+    assert read(noise, None, 1000.0, file="spindle.vcd").content == plain.content
+
+
+def test_changes_are_bounded(refused, monkeypatch):
+    monkeypatch.setattr(capture, "CHANGES_MAX", 399)
+    said = refused(vcd(), None, 1000.0, file="spindle.vcd")
+    assert said.endswith("must have at most 399 changes of its channels")
