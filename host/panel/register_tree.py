@@ -87,7 +87,9 @@ def _block(block: Block) -> str:
     items = "".join(map(_item, block.registers))
     count = f'<span class="count">{len(block.registers)}</span>'
     about = f"<p>{escape(block.about)}</p>"
-    return f'<details class="branch"><summary>{escape(block.heading)} {count}</summary>{about}<ul>{items}</ul></details>'
+    return (
+        f'<details class="branch"><summary>{escape(block.heading)} {count}</summary>{about}<ul>{items}</ul></details>'
+    )
 
 
 def _item(register: Register) -> str:

@@ -50,8 +50,9 @@ function filter() {
 
 // Asks for the registers again and again while they are shown: a tab that hangs, or is hidden, does not ask.
 export function askForRegisters() {
-  const state = board.told ? board.told.state : "";
-  if (find("registers").open && LIVE.includes(state)) send({ do: "registers" });
+  if (!find("registers").open) return;
+  if (board.told && LIVE.includes(board.told.state)) send({ do: "registers" });
+  else find("rate").textContent = "Nothing is read while no board answers: what is shown is old.";
 }
 
 hear("registers", ({ registers, period_s }) => {

@@ -324,7 +324,7 @@ def test_a_hand_moves_by_keys_and_lets_go(tab):
     before = tab.sample[1]
     hand.press("ArrowRight")
     hand.press("ArrowRight")
-    wait_until(lambda: "held at" in hand.get_attribute("aria-valuetext"))
+    wait_until(lambda: "held at" in (hand.get_attribute("aria-valuetext") or ""))
     wait_until(lambda: tab.sample[1] == pytest.approx(before + 1e-3, abs=0.4e-3))
     # A mouse that only goes over it is no hand.
     box, held = hand.bounding_box(), hand.get_attribute("aria-valuetext").rpartition("held at")[2]

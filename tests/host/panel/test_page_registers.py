@@ -86,6 +86,15 @@ def test_a_tree_that_is_closed_is_neither_read_nor_shown_as_if_it_were_of_now(pa
     assert asked() == before
 
 
+def test_a_board_that_is_silent_is_not_read_and_what_is_shown_is_old(tab, tree):
+    tab.fault("clock")
+    wait_until(lambda: "what is shown is old" in tab.text("rate"))
+    assert tab.state == "SILENT"
+    assert tab.page.locator("#tree .value").first.evaluate("(value) => Number(getComputedStyle(value).opacity)") < 0.5
+    tab.fault("clock")
+    wait_until(lambda: "at most a tenth" in tab.text("rate"))
+
+
 def test_nothing_in_the_tree_writes(tab, tree):
     assert tab.page.locator("#tree").locator("button, input, select, textarea, a, [contenteditable]").count() == 0
     assert tab.page.locator("#registers input").count() == 1
