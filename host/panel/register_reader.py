@@ -12,7 +12,7 @@ from .wishes import is_fresh, time_of
 
 ASKED_S = 1.5
 """How long registers are read after a tab has asked for them: a tab asks again and again while it shows them."""
-SHARE = 0.1
+SHARE = 0.2
 """The share of the line's time that reading may take."""
 LEAST_S = 0.5
 """The shortest time between two readings: a person does not read faster."""

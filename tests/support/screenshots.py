@@ -52,7 +52,9 @@ def push(tab: Tab) -> None:
 def measure(tab: Tab) -> None:
     """Put two cursors on the traces, which stand still, and draw their card."""
     tab.press("cursors")
-    tab.page.locator("#cursor-b").press("PageUp")
+    slider = tab.page.locator("#cursor-b")
+    slider.press("PageUp")
+    slider.blur()
     tab.page.locator(".of-traces").screenshot(path=PICTURES / "panel-traces.png")
     tab.press("pause")
     tab.press("cursors")
@@ -62,8 +64,8 @@ def registers(tab: Tab) -> None:
     """Find some registers, and draw the card of all."""
     tab.page.locator("#registers > summary").click()
     tab.page.locator("#filter").fill("wall_")
-    wait_until(lambda: "at most a tenth" in tab.text("rate"))
-    tab.page.locator("#filter").evaluate("(field) => field.blur()")
+    wait_until(lambda: "at most a fifth" in tab.text("rate"))
+    tab.page.locator("#filter").blur()
     tab.page.locator(".of-registers").screenshot(path=PICTURES / "panel-registers.png")
 
 

@@ -63,6 +63,6 @@ hear("registers", ({ registers, period_s }) => {
     if (shown.value.textContent !== said) shown.value.textContent = said;
     if (shown.word.textContent !== raw) shown.word.textContent = raw;
   }
-  const rate = `All of them are read every ${period_s.toPrecision(2)} s, so that this takes at most a tenth of the line.`;
+  const rate = `All of them are read every ${period_s.toPrecision(2)} s, so that this takes at most a fifth of the line.`;
   if (find("rate").textContent !== rate) find("rate").textContent = rate;
 });

@@ -37,7 +37,9 @@ export function drawnSamples() {
 function pause() {
   frozen = frozen ? null : samples.slice();
   find("pause").setAttribute("aria-pressed", Boolean(frozen));
+  find("still").hidden = !frozen;
   find("paused").textContent = frozen ? "The traces stand still. The board goes on, and is read on." : "";
+  sayReadout();
 }
 
 export function beginTraces(canvas) {
@@ -47,7 +49,11 @@ export function beginTraces(canvas) {
   beginCursors(canvas, SHOWN_S, ageAt, sayReadout);
 }
 
+// Writes what stands beside the drawing: for how long it stands still, and what is at the cursors.
 export function sayReadout() {
+  if (frozen && frozen.length) {
+    find("since").textContent = `They are ${number(latest()[0] - frozen[frozen.length - 1][0], 1)} s old.`;
+  }
   sayCursors(drawnSamples());
 }
 
@@ -126,11 +132,6 @@ function drawTimes(context, box, across, now, height) {
   for (const value of ticks(-SHOWN_S, 0, Math.min(5, box.width / 60)).values) {
     context.fillText(`${number(value, 0)} s`, across(now + value), height - 9);
   }
-  if (!frozen) return;
-  context.textAlign = "right";
-  context.fillStyle = colours.red;
-  const away = samples.length ? latest()[0] - now : 0;
-  context.fillText(`stands since ${number(away, 1)} s`, box.left + box.width + RIGHT, height - 9);
 }
 
 export function drawTraces(canvas) {

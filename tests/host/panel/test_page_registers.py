@@ -14,7 +14,7 @@ browsers_or_skip()
 def tree(tab) -> object:
     """The tree of a tab, opened by keys and read once."""
     tab.page.locator("#registers > summary").press("Enter")
-    wait_until(lambda: "at most a tenth" in tab.text("rate"))
+    wait_until(lambda: "at most a fifth" in tab.text("rate"))
     return tab.page.locator("#tree")
 
 
@@ -92,7 +92,7 @@ def test_a_board_that_is_silent_is_not_read_and_what_is_shown_is_old(tab, tree):
     assert tab.state == "SILENT"
     assert tab.page.locator("#tree .value").first.evaluate("(value) => Number(getComputedStyle(value).opacity)") < 0.5
     tab.fault("clock")
-    wait_until(lambda: "at most a tenth" in tab.text("rate"))
+    wait_until(lambda: "at most a fifth" in tab.text("rate"))
 
 
 def test_nothing_in_the_tree_writes(tab, tree):
