@@ -127,7 +127,7 @@ panel: $(VENV)/.panel | tools ## feel a wall: a board in simulation, behind a pa
 	@$(HARDWALL) panel virtual
 
 browser: $(VENV)/.test docs | tools ## the panel's page and these pages in a real browser (some minutes, alone on the machine)
-	@HARDWALL_BROWSER=1 $(RUN) pytest -n 0 tests/host/panel/test_page.py tests/test_site.py $(ARGS)
+	@HARDWALL_BROWSER=1 $(RUN) pytest -n 0 tests/host/panel/test_page*.py tests/test_site.py $(ARGS)
 
 screenshots: $(VENV)/.test | tools ## the pictures of the panel's page, anew, by a browser
 	@$(IN_TESTS) support.screenshots

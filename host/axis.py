@@ -126,6 +126,10 @@ class Axis(Named):
         """Return successive registers as they are; the errors are those of `Port.read`."""
         return self._port.read(address, count)
 
+    def line_s(self, count: int) -> float:
+        """Return the time that a read of so many registers takes of the line, s, by its baud rate."""
+        return self._port.line_s(count)
+
     def pulse(self, name: str) -> None:
         """Let a pulse go out.
 

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from ..model.arithmetic.fixed import SQ, UQ
 from ..model.axes.axis import AXES_MAX
 from ..model.axis.registers import CONSTANTS, LAYOUT, MAP, SPACE, TELEMETRY
-from ..model.register import Kind, Register
+from ..model.register import VALUE_BITS, Kind, Register
 from .errors import ForeignError
 from .port import Port
 
@@ -19,6 +19,17 @@ COLUMNS = ["address", "name", "kind", "signed", "bits", "si_per_lsb", "unit", "l
 """The columns of the map's table."""
 LAYOUT_AT, IDENTITY_AT, CLOCK_AT, MAP_AT, CAPTURE_AT, SAMPLE_AT, AXES_AT = 0, 2, 6, 8, 10, 12, 14
 """Addresses of the constants, which every version has at the same places; the last one of several axes only."""
+CONSTANT_NAMES = (
+    ("layout", LAYOUT_AT, ""),
+    ("identity_high", IDENTITY_AT, ""),
+    ("identity_low", IDENTITY_AT + 2, ""),
+    ("clock_hz", CLOCK_AT, "Hz"),
+    ("map_bytes", MAP_AT, ""),
+    ("capture_registers", CAPTURE_AT, ""),
+    ("clocks_per_sample", SAMPLE_AT, ""),
+    ("axes", AXES_AT, ""),
+)
+"""Name, address and unit of every constant, which the map that a device carries does not describe."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +55,15 @@ class Device:
     def of_kind(self, kind: Kind) -> tuple[Register, ...]:
         """Return the registers of a kind, in the order of their addresses."""
         return tuple(each for each in self.registers.values() if each.kind is kind)
+
+    @property
+    def constants(self) -> tuple[Register, ...]:
+        """The registers of the constants, in the order of their addresses; a device of one axis has no `axes`."""
+        return tuple(
+            Register(name, Kind.CONSTANT, UQ(VALUE_BITS, 0), "", 1.0, unit, address=CONSTANTS + at)
+            for name, at, unit in CONSTANT_NAMES
+            if name != "axes" or self.axes > 1
+        )
 
 
 def read_identity(port: Port) -> str:

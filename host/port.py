@@ -114,6 +114,13 @@ class Port:
     def _answer_s(self) -> float:
         return self._board_s / self.pace
 
+    def line_s(self, count: int) -> float:
+        """Return the time that a read of so many registers takes of the line, s: its bits, and the board's thinking."""
+        return self._line_s(Request.reading(0, count))
+
+    def _line_s(self, request: Request) -> float:
+        return (BYTE_BITS * request.size + DEVICE_BITS) / self._baud / self.pace
+
     def read(self, address: int, count: int) -> tuple[int, ...]:
         """Return successive registers, in as many requests as they need.
 
@@ -240,8 +247,7 @@ class Port:
     def _answer(self, request: Request) -> Any:
         wait_s = self._answer_s
         if self._known and not self._shared:
-            bits = BYTE_BITS * request.size + DEVICE_BITS
-            wait_s = min(wait_s, (bits / self._baud + BRIDGE_S + MACHINE_S) / self.pace)
+            wait_s = min(wait_s, self._line_s(request) + (BRIDGE_S + MACHINE_S) / self.pace)
         self._sent_s = time.monotonic()
         self._client.until_s = self._sent_s + wait_s
         try:

@@ -18,6 +18,7 @@ from ..status import State
 from .knobs import knobs_of
 from .pace import Pace
 from .recorder import Recorder, Wish
+from .register_reader import RegisterReader
 from .view import View
 from .wishes import DONE_S, Wishes, is_fresh, time_of
 
@@ -57,6 +58,7 @@ class Driver:
 
     Attributes:
         view: what is known of the board.
+        registers: reads all registers, while a tab asks for that.
 
     Raises:
         HostError: if the board cannot be had at the beginning.
@@ -64,7 +66,7 @@ class Driver:
 
     def __init__(self, connect: Callable[[], Axis]):
         self._connect, self.view = connect, View()
-        self._wishes = Wishes()
+        self._wishes, self.registers = Wishes(), RegisterReader()
         self._lock, self._ended = threading.Lock(), threading.Event()
         self._samples: deque[Sample] = deque(maxlen=KEPT)
         self._pings: dict[str, float] = {}
@@ -154,6 +156,7 @@ class Driver:
                     self._live(self._axis)
                     self._look(self._axis)
                     self._record_on(self._axis)
+                    self.registers.step(self._axis)
                     self._home_on()
             except (PortError, ForeignError, ChangedError) as error:
                 self._lose(error)
@@ -230,6 +233,7 @@ class Driver:
     def _leave_late(self) -> None:
         """Leave what was begun for a person whose board is silent now: it would end at a time that nobody expects."""
         self._recorder.leave_trigger()
+        self.registers.leave()
         self._see(recording=self._recorder.recording)
         if self._homing:
             self._leave_home()

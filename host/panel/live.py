@@ -1,8 +1,9 @@
 """The socket between a tab and the board: what must not wait for a page goes by it, the sign that the tab lives first.
 
 A tab sends objects of JSON with a key `do`: ping, arm, disarm, acknowledge (`latched`), connect, and at a virtual board
-hold (`m`), free and turn (`fault`). It gets objects with `told`, see `view.told`, when that changed, and `samples`,
-each a list of what a `Sample` has; and, as bytes, the records of `Estimates`.
+hold (`m`), free and turn (`fault`). While it shows the registers it says so again and again: registers. It gets objects
+with `told`, see `view.told`, when that changed, `samples`, each a list of what a `Sample` has, and `registers`, see
+`register_tree.told`, with their `period_s`; and, as bytes, the records of `Estimates`.
 
 Every object has a time `at_s`, s of the server's time.monotonic: of those from the server when it was sent, and of
 those from a tab when its person wished it, by the tab's clock and the last time that it got. So what a slow network or
@@ -23,6 +24,8 @@ from .driver import LATE, LOOK_S, Driver
 from .estimates import Estimates
 from .hand import Hand
 from .numbers import number_of, time_from
+from .register_reader import Reading
+from .register_tree import told as tree
 from .view import told
 from .wishes import is_fresh
 
@@ -60,6 +63,7 @@ class Live:
             "disarm": lambda tab, _: driver.disarm(),
             "acknowledge": self._acknowledge,
             "connect": lambda _, message: driver.connect(message["at_s"]),
+            "registers": lambda _, message: driver.registers.ask(message["at_s"]),
         }
         if bench:
             hand = bench.hand
@@ -122,7 +126,7 @@ class Live:
         number, _ = self._driver.samples_since(0)
         record, _ = estimates.since(0) if estimates else (0, [])
         before: dict[str, Any] = {}
-        used, timed_s = None, 0.0
+        used, timed_s, reading = None, 0.0, None
         with suppress(WebSocketDisconnect, RuntimeError):
             while True:
                 message: dict[str, Any] = {}
@@ -132,6 +136,9 @@ class Live:
                 number, samples = self._driver.samples_since(number)
                 if samples:
                     message["samples"] = samples
+                before_reading, reading = reading, self._driver.registers.reading
+                if reading and reading is not before_reading:
+                    message |= self._registers(reading)
                 if message or time.monotonic() - timed_s > TIMED_S:
                     message["at_s"] = timed_s = time.monotonic()
                     await socket.send_json(message)
@@ -144,6 +151,10 @@ class Live:
                     for each in records:
                         await socket.send_bytes(each)
                 await asyncio.sleep(LOOK_S)
+
+    def _registers(self, reading: Reading) -> dict[str, Any]:
+        device = self._driver.view.device
+        return {"registers": tree(device, reading.words), "period_s": reading.period_s} if device else {}
 
     def _told(self, tab: str) -> dict[str, Any]:
         now = told(view := self._driver.view, tab)

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from functools import partial
+from html import escape
 from pathlib import Path
 
 from nicegui import events, ui
@@ -14,6 +15,7 @@ from .home import HomeCard
 from .knobs import DIGITS, Field, Group, Knob, Way, knobs_of
 from .live import Bench
 from .numbers import TIMED, VALUED, number_of, time_from
+from .register_tree import markup
 
 STEPS = 1000
 """Places of a slider."""
@@ -21,16 +23,20 @@ TOUCH_S = 0.4
 """The time after which a knob that was touched is at rest."""
 REFRESH_S = 0.15
 """The time between two looks at what the board uses."""
-HEAD = Path(__file__).with_name("static").joinpath("head.html").read_text(encoding="utf-8")
+HEAD, TRACES, REGISTERS = (
+    Path(__file__).with_name("static").joinpath(f"{name}.html").read_text(encoding="utf-8")
+    for name in ("head", "traces", "registers")
+)
 
 
-def add_page(driver: Driver, bench: Bench | None, title: str) -> None:
+def add_page(driver: Driver, bench: Bench | None, title: str, access: str) -> None:
     """Add the page of a board, which every tab builds for itself.
 
     Args:
         driver: the board.
         bench: what is beside a virtual board; None at a real one.
         title: what the board is called.
+        access: what a person must know of the page's address.
     """
 
     @ui.page("/", language="en-US")
@@ -45,15 +51,18 @@ def add_page(driver: Driver, bench: Bench | None, title: str) -> None:
             with ui.element("div").classes("drawings"):
                 if bench:
                     _hand()
-                _drawing(
-                    "traces", "What the board shows", "Its position, velocity and force, as they are read from it."
-                )
+                ui.html(TRACES, sanitize=False).classes("card of-traces")
                 if bench and bench.estimates:
                     _estimates(*bench.estimates.names, bench.estimates.sample_hz)
                 capture = CaptureCard(driver, tab) if driver.view.span_s[1] else None
+                _registers(driver)
             with ui.element("aside").props('aria-label="Words of the board"'):
                 knobs = _knobs(driver, tab)
                 home = HomeCard(driver, tab)
+        about = f"<p>Whoever has the address of this page may arm the board. {escape(access)}</p>"
+        ui.html(f"<details><summary>Who may open this page</summary>{about}</details>", sanitize=False).classes(
+            "access"
+        )
         ui.timer(REFRESH_S, _refresher(driver, knobs))
         ui.timer(REFRESH_S, home.refresh)
         if capture:
@@ -70,6 +79,13 @@ def _hand() -> None:
         "Page Down by 5 mm, and Enter lets go."
     )
     _drawing("hand", "The hand", about, faults)
+
+
+def _registers(driver: Driver) -> None:
+    """Add the card of all registers, whose values come by the socket while it is open."""
+    device = driver.view.device
+    if device:
+        ui.html(REGISTERS.replace("<!-- tree -->", markup(device)), sanitize=False).classes("card of-registers")
 
 
 def _estimates(own: str, plain: str, sample_hz: int) -> None:

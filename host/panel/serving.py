@@ -4,7 +4,6 @@ import errno
 import hmac
 import ipaddress
 import os
-import secrets
 import socket
 import threading
 import time
@@ -14,13 +13,14 @@ from typing import Any, NamedTuple
 
 import uvicorn
 from fastapi import FastAPI, WebSocket
-from fastapi.responses import PlainTextResponse
+from fastapi.responses import PlainTextResponse, Response
 from fastapi.staticfiles import StaticFiles
 from nicegui import ui
 
 from .driver import Driver
 from .live import Bench, Live
 from .page import add_page
+from .tokens import Token, is_of_this_machine
 
 STATIC = Path(__file__).with_name("static")
 LOCAL, EVERYWHERE = "127.0.0.1", ("0.0.0.0", "::")
@@ -136,6 +136,15 @@ def _with_headers(send: Any) -> Any:
     return sends
 
 
+class FreshFiles(StaticFiles):
+    """Files that a browser asks for anew: at an address that is kept, those of another version may be in its cache."""
+
+    def file_response(self, *args: Any, **named: Any) -> Response:
+        response = super().file_response(*args, **named)
+        response.headers["Cache-Control"] = "no-cache"
+        return response
+
+
 class Listener(NamedTuple):
     """An address that is listened at.
 
@@ -146,6 +155,11 @@ class Listener(NamedTuple):
 
     host: str
     socket: socket.socket
+
+    @property
+    def is_of_this_machine(self) -> bool:
+        """Whether it can be reached from this machine only."""
+        return is_of_this_machine(self.socket.getsockname()[0])
 
 
 def listen(host: str = LOCAL, port: int = 0) -> Listener:
@@ -189,18 +203,19 @@ class PanelServer:
         bench: what is beside a virtual board; None at a real one.
         title: the title of the page.
         at: where it is served; the socket is closed at the end.
+        token: what the address begins with, for who knows it alone.
 
     Attributes:
         url: the address of the page, with its token.
     """
 
-    def __init__(self, driver: Driver, bench: Bench | None, title: str, at: Listener):
-        token, host, self._socket = secrets.token_urlsafe(16), at.host, at.socket
+    def __init__(self, driver: Driver, bench: Bench | None, title: str, at: Listener, token: Token):
+        host, self._socket = at.host, at.socket
         name = socket.gethostname() if host in EVERYWHERE else f"[{host}]" if ":" in host else host
         port = self._socket.getsockname()[1]
-        self.url = f"http://{name}:{port}/{token}/"
+        self.url = f"http://{name}:{port}/{token.text}/"
         config = uvicorn.Config(
-            Guard(_application(driver, bench, title, token), token, {host, name, *LOCALS}, port),
+            Guard(_application(driver, bench, title, token), token.text, {host, name, *LOCALS}, port),
             log_level="error",
             access_log=False,
             ws="websockets-sansio",
@@ -226,16 +241,17 @@ class PanelServer:
         self._socket.close()
 
 
-def _application(driver: Driver, bench: Bench | None, title: str, token: str) -> FastAPI:
+def _application(driver: Driver, bench: Bench | None, title: str, token: Token) -> FastAPI:
     """Return the application, all of whose paths begin with the token."""
-    application, live = FastAPI(openapi_url=None), Live(driver, bench)
+    application, live, first = FastAPI(openapi_url=None), Live(driver, bench), f"/{token.text}"
 
-    @application.websocket(f"/{token}/live")
+    @application.websocket(f"{first}/live")
     async def _(socket: WebSocket, tab: str) -> None:
         await live.serve(socket, tab)
 
-    application.mount(f"/{token}/static", StaticFiles(directory=STATIC))
-    add_page(driver, bench, title)
+    application.mount(f"{first}/static", FreshFiles(directory=STATIC))
+    add_page(driver, bench, title, token.about)
     # Everything comes from this server: no other one is asked, so that the page works without a network.
-    ui.run_with(application, mount_path=f"/{token}", title=title, tailwind=False, show_welcome_message=False)
+    # Whether it is light or dark is the browser's to say.
+    ui.run_with(application, mount_path=first, title=title, dark=None, tailwind=False, show_welcome_message=False)
     return application

@@ -1,5 +1,6 @@
 """What a device says of itself: its registers as they were described, and errors for what is none of ours."""
 
+import dataclasses
 import zlib
 
 import pytest
@@ -8,6 +9,19 @@ from hardwall.host.connect import connect
 from hardwall.host.errors import ChangedError, ForeignError
 from hardwall.model.axis.registers import MAP
 from hardwall.model.register import Kind
+
+
+def test_the_constants_are_those_of_the_map(axis, registers):
+    expected = [each for each in registers.registers if each.kind is Kind.CONSTANT]
+    found = axis.device.constants
+    assert [(each.address, each.name, each.unit) for each in found] == [
+        (each.address, each.name, each.unit) for each in expected
+    ]
+    assert [axis.read_registers(each.address, 2) for each in found] == [
+        each.to_registers(each.reset) for each in expected
+    ]
+    several = dataclasses.replace(axis.device, axes=2).constants
+    assert [each.name for each in several] == [*(each.name for each in expected), "axes"]
 
 
 def carry(board, compressed: bytes) -> None:

@@ -15,6 +15,8 @@ CHROMIUM = Path("/usr/bin/chromium")
 ABSENT = f"there is no {CHROMIUM}: install the Debian package chromium"
 PRESS_S = 1.0
 """The time in which an act has its effect, or is tried again."""
+PHONE = 700
+"""The width of a window, pixels, below which it is one that is touched."""
 SHOWN_MM = 50
 """The width of the drawing of the hand."""
 
@@ -38,13 +40,17 @@ class Tab:
     Args:
         chromium: the browser.
         url: the page's address.
+        width, height: the size of its window, pixels.
+        scheme: light or dark.
 
     Attributes:
         page: the page; asked: the addresses that it asked for; errors: what went wrong in it.
     """
 
-    def __init__(self, chromium: Browser, url: str, width: int = 1280, height: int = 1100):
-        self.page: Page = chromium.new_context(viewport={"width": width, "height": height}).new_page()
+    def __init__(self, chromium: Browser, url: str, width: int = 1280, height: int = 1100, scheme: str = "light"):
+        size = {"width": width, "height": height}
+        context = chromium.new_context(viewport=size, color_scheme=scheme, has_touch=width < PHONE)
+        self.page: Page = context.new_page()
         self.page.set_default_timeout(1e3 * PATIENCE_S)
         self.asked, self.errors = [], []
         self.page.on("request", lambda request: self.asked.append(request.url))
@@ -81,9 +87,25 @@ class Tab:
         """Press a button of the head, if it has a meaning now."""
         self.page.evaluate("(name) => document.getElementById(name).click()", name)
 
+    def open_all(self) -> None:
+        """Show all that is not shown at first: signals, cursors, and all registers once they are read."""
+        self.page.locator("#cursors").click()
+        self.page.evaluate("for (const each of document.querySelectorAll('details')) each.open = true")
+        wait_until(lambda: "at most a fifth" in self.text("rate"))
+
     def fault(self, name: str) -> None:
-        """Break or mend something."""
-        self.page.locator(f"[data-fault={name}]").click()
+        """Break or mend something; press again when this machine was too slow for it, so that nothing was done."""
+        button = self.page.locator(f"[data-fault={name}]")
+        is_broken = lambda: "broken" in (button.get_attribute("class") or "")  # noqa: E731
+        before, pressed = is_broken(), -PRESS_S
+        deadline = time.monotonic() + PATIENCE_S
+        while is_broken() == before:
+            now = time.monotonic()
+            assert now < deadline, f"{name}: {self.text('said')}"
+            if now - pressed > PRESS_S:
+                pressed = now
+                button.click()
+            self.page.wait_for_timeout(50)
 
     def used(self, word: str) -> float:
         """Return what the board uses of a word, as the page shows it."""

@@ -45,7 +45,28 @@ def push(tab: Tab) -> None:
             tab.page.wait_for_timeout(step_ms)
         tab.until(lambda: tab.state == "ARMED" and tab.sample[4] < -2)
         tab.page.screenshot(path=PICTURES / "panel.png")
+        tab.press("pause")
         print(f"{tab.text('pace')}; a frame takes {tab.page.evaluate(FRAME_MS, FRAMES):.1f} ms")
+
+
+def measure(tab: Tab) -> None:
+    """Put two cursors on the traces, which stand still, and draw their card."""
+    tab.press("cursors")
+    slider = tab.page.locator("#cursor-b")
+    slider.press("PageUp")
+    slider.blur()
+    tab.page.locator(".of-traces").screenshot(path=PICTURES / "panel-traces.png")
+    tab.press("pause")
+    tab.press("cursors")
+
+
+def registers(tab: Tab) -> None:
+    """Find some registers, and draw the card of all."""
+    tab.page.locator("#registers > summary").click()
+    tab.page.locator("#filter").fill("wall_")
+    wait_until(lambda: "at most a fifth" in tab.text("rate"))
+    tab.page.locator("#filter").blur()
+    tab.page.locator(".of-registers").screenshot(path=PICTURES / "panel-registers.png")
 
 
 def trip(tab: Tab) -> None:
@@ -68,8 +89,11 @@ def main() -> int:
         tab = Tab(chromium, line(process).removeprefix("page: "), WIDTH, 1250)
         tab.arm()
         push(tab)
+        measure(tab)
+        registers(tab)
+        tab.page.evaluate("window.scrollTo(0, 0)")
         trip(tab)
-    for name in ("panel.png", "panel-tripped.png"):
+    for name in ("panel.png", "panel-traces.png", "panel-registers.png", "panel-tripped.png"):
         print(PICTURES / name)
     return 0
 

@@ -1,7 +1,20 @@
 // What the drawings share: a canvas in the pixels of the screen, colours, and round numbers for axes.
 
-export const INK = "#1d2733", PALE = "#8894a3", GRID = "#e3e8ee";
-export const BLUE = "#0072B2", GREEN = "#009E73", RED = "#D55E00", GREY = "#444444";
+const LIGHT = {
+  ...{ ink: "#1d2733", pale: "#5d6b7a", grid: "#e3e8ee", wall: "#fbe3d3", hatch: "#eab48f" },
+  ...{ blue: "#0072b2", green: "#00795a", red: "#c25400", violet: "#8a3f8f", grey: "#444444" },
+};
+const DARK = {
+  ...{ ink: "#e6ebf0", pale: "#a3afbc", grid: "#333d48", wall: "#4a2f1c", hatch: "#8a5530" },
+  ...{ blue: "#5cb3ec", green: "#3cc79a", red: "#f5924a", violet: "#d79ddb", grey: "#c4c4c4" },
+};
+const scheme = window.matchMedia("(prefers-color-scheme: dark)");
+export const colours = {}; // those of the browser's scheme, light or dark
+function choose() {
+  Object.assign(colours, scheme.matches ? DARK : LIGHT);
+}
+scheme.addEventListener("change", choose);
+choose();
 export const FONT = "12px Roboto, sans-serif", SMALL = "11px Roboto, sans-serif";
 
 // Returns the context of a canvas, cleared, with the unit of one pixel of the page; and its size.
@@ -45,14 +58,14 @@ export function strip(context, box, low, high, name) {
   const marks = ticks(low, high, Math.max(2, Math.round(height / 22)));
   context.textAlign = "right";
   for (const value of marks.values) {
-    context.fillStyle = GRID;
+    context.fillStyle = colours.grid;
     context.fillRect(left, Math.round(at(value)), width, 1);
-    context.fillStyle = PALE;
+    context.fillStyle = colours.pale;
     context.font = SMALL;
     context.fillText(number(value, marks.decimals), left - 6, at(value));
   }
   context.textAlign = "left";
-  context.fillStyle = INK;
+  context.fillStyle = colours.ink;
   context.font = FONT;
   context.fillText(name, left, top - 9);
   return at;

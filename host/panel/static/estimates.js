@@ -1,14 +1,14 @@
 // Two estimators of the same counts, side by side, at every sample; and the force of one of them as sound.
 
 import { hear } from "./live.js";
-import { GREY, NAME, PALE, RED, cleared, number, strip } from "./canvas.js";
+import { NAME, cleared, colours, number, strip } from "./canvas.js";
 
 const SHOWN_S = 0.5, LEFT = 58, HEAD = 18, MIDDLE = 66, RIPPLE_S = 5e-3;
 const ROWS = [
   { name: "velocity, mm/s", unit: "mm/s", scale: 1e3, least: 4, decimals: 2 },
   { name: "force of the wall, N", unit: "N", scale: 1, least: 0.2, decimals: 3 },
 ];
-const COLOURS = [RED, GREY], NARROW = 480;
+const COLOURS = ["red", "grey"], NARROW = 480;
 let rings = null, head = 0, filled = 0, rate = 0, ripples = [];
 
 hear("records", (record) => {
@@ -76,7 +76,7 @@ export function drawEstimates(canvas) {
       const left = lane && !narrow ? LEFT + across + MIDDLE : LEFT, begin = narrow ? lane * part : 0;
       const top = begin + HEAD + NAME + line * (tall + NAME);
       const at = strip(context, { left, top, width: across, height: tall }, low, high, kind.name);
-      context.fillStyle = COLOURS[lane];
+      context.fillStyle = colours[COLOURS[lane]];
       for (let k = 0; k < across; k++) {
         if (each.low[k] > each.high[k]) continue;
         const from = at(each.high[k] * kind.scale);
@@ -92,7 +92,7 @@ export function drawEstimates(canvas) {
         context.fillText(names[lane], left, begin + 8);
         context.textAlign = "right";
         context.font = "11px Roboto, sans-serif";
-        context.fillStyle = PALE;
+        context.fillStyle = colours.pale;
         context.fillText(`the last ${SHOWN_S} s of the board`, left + across, begin + 8);
       }
     });

@@ -1,7 +1,7 @@
 // The hand: a drawing of handle, wall and force, on which the handle is dragged.
 
 import { board, send } from "./live.js";
-import { BLUE, GRID, INK, PALE, RED, cleared, number, ticks } from "./canvas.js";
+import { cleared, colours, number, ticks } from "./canvas.js";
 import { latest } from "./traces.js";
 
 const SHOWN_MM = 50, SHOULDER_MM = 18, FLOOR = 34, HANDLE = 30;
@@ -75,9 +75,9 @@ function hatch(context, x, width, height) {
   context.beginPath();
   context.rect(x, 0, width, height);
   context.clip();
-  context.fillStyle = "#fbe3d3";
+  context.fillStyle = colours.wall;
   context.fillRect(x, 0, width, height);
-  context.strokeStyle = "#eab48f";
+  context.strokeStyle = colours.hatch;
   context.lineWidth = 1;
   context.beginPath();
   for (let k = x - height; k < x + width; k += 12) {
@@ -90,7 +90,7 @@ function hatch(context, x, width, height) {
 
 function arrow(context, x, y, length) {
   const way = Math.sign(length), head = Math.min(9, Math.abs(length));
-  context.strokeStyle = context.fillStyle = RED;
+  context.strokeStyle = context.fillStyle = colours.red;
   context.lineWidth = 4;
   context.beginPath();
   context.moveTo(x, y);
@@ -117,25 +117,25 @@ export function drawHand(canvas) {
     const edge = across(wall);
     if (left) hatch(context, 0, Math.max(edge, 0), ground);
     else hatch(context, edge, Math.max(width - edge, 0), ground);
-    context.fillStyle = RED;
+    context.fillStyle = colours.red;
     context.fillRect(edge - 1, 0, 3, ground);
     context.textAlign = left ? "right" : "left";
     context.font = "12px Roboto, sans-serif";
     context.fillText("wall", edge + (left ? -8 : 8), 12);
   }
-  context.fillStyle = INK;
+  context.fillStyle = colours.ink;
   context.fillRect(0, ground, width, 2);
   context.textAlign = "center";
-  context.fillStyle = PALE;
+  context.fillStyle = colours.pale;
   for (const mm of ticks(from, from + SHOWN_MM, Math.min(10, width / 60)).values) {
-    context.fillStyle = GRID;
+    context.fillStyle = colours.grid;
     context.fillRect(across(mm), ground + 2, 1, 6);
-    context.fillStyle = PALE;
+    context.fillStyle = colours.pale;
     context.fillText(`${number(mm, 0)} mm`, across(mm), ground + 18);
   }
   const x = across(at);
   context.font = "600 15px Roboto, sans-serif";
-  context.fillStyle = BLUE;
+  context.fillStyle = colours.blue;
   context.beginPath();
   context.roundRect(x - HANDLE, ground - HANDLE, HANDLE, HANDLE, 5);
   context.fill();
@@ -145,7 +145,7 @@ export function drawHand(canvas) {
   context.fill();
   if (told.hand_m !== null && told.hand_m !== undefined) {
     const hand = across(told.hand_m * 1e3) - HANDLE / 2;
-    context.strokeStyle = INK;
+    context.strokeStyle = colours.ink;
     context.lineWidth = 2;
     context.beginPath();
     context.arc(hand, ground - HANDLE - 26, 15, 0, 7);
@@ -155,7 +155,7 @@ export function drawHand(canvas) {
   }
   if (Math.abs(force) > 0.02) {
     arrow(context, force < 0 ? x - HANDLE - 4 : x + 4, middle, Math.max(-150, Math.min(150, force * 8)));
-    context.fillStyle = RED;
+    context.fillStyle = colours.red;
     context.textAlign = force < 0 ? "right" : "left";
     context.fillText(`${number(force, 2)} N`, force < 0 ? x - HANDLE - 8 : x + 8, middle - 18);
   }

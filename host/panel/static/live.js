@@ -9,7 +9,7 @@ const TIMED = 256; // the messages of some seconds, of which the fastest tells t
 
 export const board = { told: null };
 let heard = 0, truth = null, old = false; // `truth` is what was told last
-const hearers = { told: [], samples: [], records: [] };
+const hearers = { told: [], samples: [], records: [], registers: [] };
 let socket = null;
 const leads = []; // the server's time less ours, s, by the last messages: too small by the time that each took
 
@@ -60,9 +60,8 @@ export function open() {
       old = false;
       tell("told", (board.told = truth));
     }
-    if (message.samples) {
-      tell("samples", message.samples);
-    }
+    if (message.samples) tell("samples", message.samples);
+    if (message.registers) tell("registers", message);
   };
   socket.onclose = () => {
     leads.length = 0;

@@ -1,7 +1,8 @@
 // The page: its head, its buttons, and the loop that draws and shows that the tab lives.
 
 import { ALIVE_MS, LIVE, board, hear, look, open, send } from "./live.js";
-import { drawTraces, sayTraces, takeFresh } from "./traces.js";
+import { beginTraces, drawTraces, sayReadout, sayTraces, takeFresh } from "./traces.js";
+import { askForRegisters, beginRegisters } from "./registers.js";
 import { drawHand, listen, release, sayHand } from "./hand.js";
 import { begin, drawEstimates, keepPace, listenTo, sayEstimates } from "./estimates.js";
 
@@ -81,7 +82,11 @@ function frame(now) {
   }
   if (takeFresh()) drawn.push(now);
   const say = now - said >= SAY_MS;
-  if (say) said = now;
+  if (say) {
+    said = now;
+    isolated("readout", sayReadout);
+    isolated("registers", askForRegisters);
+  }
   for (const [name, draw] of Object.entries(DRAWINGS)) {
     const canvas = find(name);
     if (!canvas) continue;
@@ -103,6 +108,8 @@ function start() {
     begin(find("estimates"));
     listenTo(find("sound"));
   }
+  isolated("traces", () => beginTraces(find("traces")));
+  isolated("registers", beginRegisters);
   open();
   window.requestAnimationFrame(frame);
 }

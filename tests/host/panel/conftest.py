@@ -1,5 +1,6 @@
-"""A board of the model that arms and trips as a board does, behind a driver."""
+"""A board of the model that arms and trips as a board does, behind a driver; and a virtual one behind a real page."""
 
+import subprocess
 from collections.abc import Iterator
 
 import pytest
@@ -8,6 +9,8 @@ from host.twin_board import TwinBoard
 from hardwall.host.connect import connect
 from hardwall.host.panel.driver import Driver
 from hardwall.model.axis.supervisor import ARMED, DISARMED
+from support.page_at_rest import PANEL, rests
+from support.processes import line, started
 
 
 class ArmingBoard(TwinBoard):
@@ -34,3 +37,31 @@ def driver(board) -> Iterator[Driver]:
     found = Driver(lambda: connect(board.name, answer_s=2.0))
     yield found
     found.close()
+
+
+@pytest.fixture(scope="module")
+def panel() -> Iterator[subprocess.Popen]:
+    """The page of a virtual board; its process has the `url`."""
+    with started(*PANEL) as process:
+        process.url = line(process).removeprefix("page: ")
+        yield process
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[object]:
+    from support.browsers import browser  # noqa: PLC0415  (only tests in a browser need one)
+
+    with browser() as found:
+        yield found
+
+
+@pytest.fixture
+def tab(panel, chromium) -> Iterator[object]:
+    """A tab whose board is whole and disarmed, with a soft wall at 5 mm, in front of which the handle is."""
+    from support.browsers import Tab  # noqa: PLC0415
+
+    found = Tab(chromium, panel.url)
+    rests(found)
+    yield found
+    assert found.errors == []
+    found.page.context.close()

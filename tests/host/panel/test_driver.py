@@ -266,6 +266,16 @@ def test_a_silent_board_is_asked_again(driver, board):
     assert not driver.view.lost
 
 
+def test_registers_of_a_board_that_falls_silent_are_not_shown_as_if_they_were_of_now(driver, board):
+    driver.registers.ask()
+    wait_until(lambda: driver.registers.ask() or driver.registers.reading)
+    board.lost = 1 << 30
+    wait_until(lambda: driver.view.status is None)
+    assert driver.registers.reading is None
+    board.lost = 0
+    wait_until(lambda: driver.registers.ask() or driver.registers.reading)
+
+
 def test_a_fault_of_its_own_is_no_old_state(driver, monkeypatch):
     def fails(*_: object) -> None:
         raise ZeroDivisionError("oops")

@@ -99,6 +99,28 @@ def test_what_is_told_is_told_when_it_changes_and_samples_always(driver, live, b
     assert times == sorted(set(times))
 
 
+def test_registers_are_sent_while_a_tab_shows_them(driver, live, board):
+    board.show(count=5)
+    quiet = Socket(lambda: len(quiet.sent) > 5)
+    serve(live, quiet)
+    assert not any("registers" in message for message in quiet.sent)
+    socket = Socket({"do": "registers"}, lambda: any("registers" in message for message in socket.sent))
+    serve(live, socket)
+    (found,) = (message for message in socket.sent if "registers" in message)
+    assert found["registers"]["count"] == ["5e-06 m", "5 = 0x00000005"]
+    assert found["period_s"] >= 0.5
+    # What is read is not kept for a tab that comes later.
+    wait_until(lambda: driver.registers.reading is None)
+
+
+def test_a_tab_that_only_looks_at_registers_writes_nothing(driver, live, board):
+    wait_until(lambda: driver.view.status)
+    before = len(board.requests)
+    socket = Socket({"do": "registers"}, lambda: any("registers" in message for message in socket.sent))
+    serve(live, socket)
+    assert {request[1] for request in board.requests[before:]} == {3}
+
+
 @pytest.mark.parametrize(
     "message",
     [
@@ -106,6 +128,7 @@ def test_what_is_told_is_told_when_it_changes_and_samples_always(driver, live, b
         *({"do": "hold", "m": m} for m in (*NUMBERLESS, None, True, [1.0])),
         *({"do": "acknowledge", "latched": word} for word in (*NUMBERLESS, 1.0, -1, 1 << 32, True)),
         *({"do": "ping", "at_s": at_s} for at_s in (*NUMBERLESS, "0", True)),
+        *({"do": "registers", "at_s": at_s} for at_s in (*NUMBERLESS, "0")),
         *({"do": "turn", "fault": fault} for fault in (["wire"], None, 0)),
     ],
 )

@@ -1,71 +1,23 @@
 """The page of a panel in a real browser, with a virtual board behind it: seen, set, armed, pushed, broken and left."""
 
-import os
 import re
 import signal
-import subprocess
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Iterator
 
 import numpy as np
 import psutil
 import pytest
 
 from hardwall.host.panel.view import ADVICE
+from support.browser_tests import browsers_or_skip
+from support.page_at_rest import SIZES, rests
 from support.processes import HARDWALL, ended, line, started, wait_until
 from support.virtual_boards import SCENE, running
 
-if "HARDWALL_BROWSER" not in os.environ:
-    pytest.skip(
-        "a browser and a board in simulation want the machine for themselves: make browser", allow_module_level=True
-    )
-browsers = pytest.importorskip("support.browsers", reason="playwright is not installed")
+browsers = browsers_or_skip()
 Axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe
-if not browsers.CHROMIUM.exists():
-    pytest.skip(browsers.ABSENT, allow_module_level=True)
-
-
-def changes(*assignments: str) -> list[str]:
-    return [word for each in assignments for word in ("--set", each)]
-
-
-WORDS = [str(HARDWALL), "panel", "virtual", *changes(*(f"{key}={value}" for key, value in SCENE.items()))]
-
-
-@pytest.fixture(scope="module")
-def panel() -> Iterator[subprocess.Popen]:
-    with started(*WORDS) as process:
-        process.url = line(process).removeprefix("page: ")
-        yield process
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[object]:
-    with browsers.browser() as found:
-        yield found
-
-
-@pytest.fixture
-def tab(panel, chromium) -> Iterator[object]:
-    """A tab whose board is whole and disarmed, with a soft wall at 5 mm, in front of which the handle is."""
-    found = browsers.Tab(chromium, panel.url)
-    rests(found)
-    yield found
-    assert found.errors == []
-    found.page.context.close()
-
-
-def rests(tab) -> None:
-    """Mend what is broken, acknowledge what stands, disarm, and bring the handle in front of the wall."""
-    while (broken := tab.page.locator(".fault.broken")).count():
-        broken.first.click()
-        tab.page.wait_for_timeout(200)
-    wait_until(lambda: tab.press("disarm") or tab.press("acknowledge") or tab.state == "DISARMED")
-    if abs(tab.sample[1]) > 2e-3:
-        with tab.dragged(-5):
-            wait_until(lambda: abs(tab.sample[1]) < 1e-3)
 
 
 def refused(url: str) -> int:
@@ -306,13 +258,12 @@ def test_the_index_becomes_the_origin_and_the_first_one_again(tab):
         wait_until(lambda: abs(tab.sample[1] - 2e-3) < 0.5e-3)
 
 
-SIZES = {"desk": (1280, 1100), "phone": (390, 844)}
-
-
+@pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("size", SIZES)
-def test_a_page_has_names_contrast_and_landmarks(panel, chromium, tab, size):
-    """Axe, at rest and while the axis is armed and tripped."""
-    sized = browsers.Tab(chromium, panel.url, *SIZES[size])
+def test_a_page_has_names_contrast_and_landmarks(panel, chromium, tab, size, scheme):
+    """Axe, at rest and while the axis is armed and tripped, with all open that can be."""
+    sized = browsers.Tab(chromium, panel.url, *SIZES[size], scheme)
+    sized.open_all()
     found = []
     for fault in ("", "stop"):
         if fault:
@@ -373,7 +324,7 @@ def test_a_hand_moves_by_keys_and_lets_go(tab):
     before = tab.sample[1]
     hand.press("ArrowRight")
     hand.press("ArrowRight")
-    wait_until(lambda: "held at" in hand.get_attribute("aria-valuetext"))
+    wait_until(lambda: "held at" in (hand.get_attribute("aria-valuetext") or ""))
     wait_until(lambda: tab.sample[1] == pytest.approx(before + 1e-3, abs=0.4e-3))
     # A mouse that only goes over it is no hand.
     box, held = hand.bounding_box(), hand.get_attribute("aria-valuetext").rpartition("held at")[2]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from hardwall.host.panel.serving import REFUSED, AddressError, Guard, ServerError, listen
+from hardwall.host.panel.serving import REFUSED, STATIC, AddressError, FreshFiles, Guard, ServerError, listen
 
 
 async def inner(scope, receive, send) -> None:
@@ -124,6 +124,28 @@ def test_who_does_not_is_refused(path):
 
 def test_the_server_s_own_life_needs_no_token():
     assert answered("lifespan", "") == [{"type": "inner", "path": ""}]
+
+
+def test_a_script_of_the_page_is_asked_for_anew():
+    """The address may be that of an older version, whose scripts a browser has kept."""
+    sent = []
+
+    async def send(message: dict) -> None:
+        sent.append(message)
+
+    files = FreshFiles(directory=STATIC)
+    asgi = {"asgi": {"spec_version": "2.4"}}
+    scope = {"type": "http", "method": "GET", "path": "/panel.js", "headers": [], "root_path": "", **asgi}
+    asyncio.run(files(scope, None, send))
+    assert sent[0]["status"] == 200
+    assert dict(sent[0]["headers"])[b"cache-control"] == b"no-cache"
+
+
+@pytest.mark.parametrize(("host", "so"), [("127.0.0.1", True), ("localhost", True), ("0.0.0.0", False)])
+def test_whether_an_address_is_of_this_machine_only(host, so):
+    at = listen(host)
+    with at.socket:
+        assert at.is_of_this_machine == so
 
 
 def test_a_port_that_is_taken_is_one_line():
