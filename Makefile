@@ -166,8 +166,8 @@ fuzz: $(VENV)/.test | tools ## 20 000 hostile calls of the command line, and 200
 matrix: $(VENV)/.test | tools ## the wheel with each extra, installed elsewhere: oldest and newest packages, every Python (half an hour)
 	@HARDWALL_MATRIX="$(PYTHONS)" $(RUN) pytest -n 0 -o faulthandler_timeout=0 tests/test_installed.py $(ARGS)
 
-release: $(VENV)/.test $(VENV)/.synth $(VENV)/.docs | tools ## wheel, sdist, Verilog of every scene, pages, licences and sums, in build/release/ (some minutes)
-	@$(IN_TESTS) support.release
+release: $(VENV)/.test $(VENV)/.synth $(VENV)/.docs | tools ## wheel, sdist, bitstreams, Verilog of every scene, pages, licences and sums, in build/release/ (half an hour)
+	@$(IN_TESTS) support.release $(BOARDS)
 
 # Names, versions and hashes; no address of an index, which is for each machine to say. What is in it stays, unless
 # pyproject.toml no longer allows it or ARGS="--upgrade" asks for newer ones.

@@ -18,7 +18,7 @@ def twice(tmp_path_factory) -> list:
     folders = [tmp_path_factory.mktemp(name) for name in ("first", "second")]
     for folder in folders:
         # Place and route is not among the tests' tools.
-        release.made(folder, [SCENE], with_pages=False, extras=("host", "sim", "testing"))
+        release.made(folder, [SCENE], [], with_pages=False, extras=("host", "sim", "testing"))
     return folders
 
 
@@ -26,6 +26,23 @@ def test_two_runs_make_the_same_bytes(twice):
     first, second = ({path.name: path.read_bytes() for path in folder.iterdir()} for folder in twice)
     assert len(first) == 5
     assert first == second
+
+
+def test_the_bitstreams_of_the_boards_are_in_an_archive(tmp_path, monkeypatch):
+    def run(*command):
+        """Stand in for place and route."""
+        _, task, board, _, folder = command
+        assert task == "board"
+        folder.mkdir(parents=True)
+        (folder / "board.bit").write_text(board)
+
+    monkeypatch.setattr(release, "_run", run)
+    release.made(tmp_path, [], ["icebreaker", "tangnano9k"], with_pages=False, extras=("host",))
+    (archive,) = tmp_path.glob("*-boards.tar.gz")
+    with tarfile.open(archive) as tar:
+        files = {member.name.partition("/")[2]: tar.extractfile(member).read() for member in tar if member.isfile()}
+    assert files == {f"{board}/board.bit": board.encode() for board in ("icebreaker", "tangnano9k")}
+    assert archive.name in (tmp_path / release.SUMS).read_text()
 
 
 def test_an_archive_is_the_same_whatever_wrote_it(tmp_path):

@@ -1,4 +1,4 @@
-"""What is handed out: wheel, sdist, Verilog of every scene, pages, licences of what they need, and the sums of all.
+"""What is handed out: wheel, sdist, Verilog of scenes, bitstreams, pages, licences of packages, and the sums of all.
 
 Two runs on the same commit with the same packages give the same bytes. Every file has the commit's time and no owner.
 """
@@ -26,12 +26,15 @@ EXTRAS = "host", "panel", "sim", "synth", "testing"
 SUMS, LICENCES = "SHA256SUMS", "LICENCES.txt"
 
 
-def made(folder: Path, scenes: Iterable[str], with_pages: bool, extras: Iterable[str] = EXTRAS) -> list[Path]:
+def made(
+    folder: Path, scenes: Iterable[str], boards: Iterable[str], with_pages: bool, extras: Iterable[str] = EXTRAS
+) -> list[Path]:
     """Make a release in an empty folder; return its files.
 
     Args:
         folder: the folder.
         scenes: the names of the scenes whose Verilog it has.
+        boards: the boards whose bitstreams it has, with their reports and their wiring.
         with_pages: whether it has the pages.
         extras: the extras whose packages' licences it lists; they must be installed.
     """
@@ -41,9 +44,12 @@ def made(folder: Path, scenes: Iterable[str], with_pages: bool, extras: Iterable
         for path in distributions:
             shutil.copy(path, folder)
         stem = distributions[0].name.removesuffix(".tar.gz")
-        for scene in scenes:
-            _run(HARDWALL, "verilog", scene, "--output-folder", work / f"{stem}-verilog" / scene)
-        _pack(work / f"{stem}-verilog", folder)
+        for task, names, kind in (("verilog", scenes, "verilog"), ("board", boards, "boards")):
+            tree = work / f"{stem}-{kind}"
+            for each in names:
+                _run(HARDWALL, task, each, "--output-folder", tree / each)
+            if tree.exists():
+                _pack(tree, folder)
         if with_pages:
             sphinx = sys.executable, "-m", "sphinx", "--quiet", "--fail-on-warning", "--doctree-dir", work / "doctrees"
             _run(*sphinx, "docs", work / f"{stem}-pages")
@@ -93,10 +99,10 @@ def licences(extras: Iterable[str]) -> str:
 
 
 def main() -> None:
-    """Make the whole release, and print its files."""
+    """Make the whole release, with the bitstreams of the boards that are named, and print its files."""
     shutil.rmtree(RELEASE, ignore_errors=True)
     RELEASE.mkdir(parents=True)
-    for path in made(RELEASE, SCENES, with_pages=True):
+    for path in made(RELEASE, SCENES, sys.argv[1:], with_pages=True):
         print(path.relative_to(ROOT))
 
 
