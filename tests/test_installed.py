@@ -115,8 +115,8 @@ def test_the_extra_sim_hits_and_replays(place, tmp_path):
     with place("sim") as environment:
         forces = report(environment.run(*HIT, "--backend", "float"))["max_force_n"]
         assert forces == pytest.approx(12.56, abs=0.01)
-        # A home that is not there, and that what runs here cannot make.
-        home = environment.folder / "home"
+        # A home that is not there, and stays so.
+        home = environment.folder / "absent"
         keeping = {"HARDWALL_BUILD": environment.work / "mäde", "HOME": home}
         fixed = environment.run(*HIT, **keeping)
         rtl = (*HIT, "--backend", "rtl")
@@ -130,6 +130,9 @@ def test_the_extra_sim_hits_and_replays(place, tmp_path):
         written = environment.run("hardwall", "verilog", "--board", "icebreaker", "-o", "files", **keeping)
         assert (written.returncode, written.stderr) == (0, "")
         assert not home.exists()
+        # An older Typer has other words for this, and other names for some options.
+        refused = environment.run("hardwall", "hit", "--stiffness", "x", **keeping)
+        assert (refused.returncode, refused.stderr) == (2, "hardwall: error: --stiffness must be a number, not 'x'\n")
         assert environment.run("python", "-c", page("docs/guide/start.md").text).returncode == 0
         replay = "hardwall", "replay", "recording.csv", "--column", "counts", "--plot", "replay.png", "--json"
         assert report(environment.run(*replay, **keeping))["samples"] == 2000
