@@ -26,7 +26,7 @@ DEAF_S, RUBBISH_MAX = 0.1, 16
 """The time for which a program is not heard after bytes that are no request, and after how many such in a row it is
 left. One that sends nothing else would take the processor from the holder of the lease, whose beats would be late."""
 OWN_S = 0.01
-"""The time after which a request is answered that does not go to the board, for the same reason."""
+"""The time for a request that does not go to the board, one after the other, for the same reason."""
 WRITE_MANY = 16
 CONFORMITY = 0x83
 """The identification has objects of its own."""
@@ -70,7 +70,7 @@ class Relay:
         # Until when the line is kept for the holder, and how many requests in a row it has had.
         self._kept_s, self._in_a_row = 0.0, 0
         self._connections: set[socket.socket] = set()
-        self._ended = threading.Event()
+        self._ended, self._own_turns = threading.Event(), threading.Lock()
         self._welcoming = threading.Thread(target=self._welcome, name="hardwall-relay", daemon=True)
         self._welcoming.start()
 
@@ -154,7 +154,8 @@ class Relay:
         """Return the answer to a request, both without their CRC."""
         function = request[1]
         if (own := self._own_answer(request)) is not None:
-            self._ended.wait(OWN_S)
+            with self._own_turns:
+                self._ended.wait(OWN_S)
             return own
         with self._turns:
             self._wait_for_turn(self._lease.holder is guest)

@@ -271,14 +271,17 @@ def test_a_program_that_sends_nothing_but_rubbish_is_left(relay, monkeypatch):
     wait_until(lambda: not relay._connections)
 
 
-@pytest.mark.parametrize("request_", [bytes([1, 8, 0, 0, 1, 2]), bytes([1, 0x2B, 14, 4, 0x80])])
-def test_what_is_not_of_the_board_is_answered_after_a_while(relay, request_):
-    with line_to(relay) as line:
-        answered(line, READ_LAYOUT, 9)
+@pytest.mark.parametrize(("request_", "size"), [(bytes([1, 8, 0, 0, 1, 2]), 8), (bytes([1, 0x2B, 14, 4, 0x80]), 12)])
+def test_what_is_not_of_the_board_takes_a_while_whoever_asks(relay, request_, size):
+    with line_to(relay) as line, line_to(relay) as other:
+        for each in (line, other):
+            answered(each, READ_LAYOUT, 9)
         began_s = time.monotonic()
         for _ in range(5):
-            answered(line, framed(request_), 8)
-        assert time.monotonic() - began_s >= 5 * relays.OWN_S
+            line.sendall(framed(request_))
+            answered(other, framed(request_), size)
+            answered(line, b"", size)
+        assert time.monotonic() - began_s >= 10 * relays.OWN_S
 
 
 def test_programs_come_again_when_there_are_files_again(relay, monkeypatch):
