@@ -206,8 +206,7 @@ class Sampler:
     def _keep(self, state: State, place: float, samples: int) -> None:
         words, timing = controller(self._axis, 0)[0], self._axis.design.timing
         kind = _cell(*map(numba.typeof, (words, state, timing)))
-        # What the state has in arrays is its own.
-        self._kept = kind(words, deepcopy(state), timing, float(self.spec.count_m), place, samples)
+        self._kept = kind(words, state, timing, float(self.spec.count_m), place, samples)
 
     @property
     def state(self) -> State | None:

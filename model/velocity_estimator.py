@@ -122,7 +122,7 @@ class VelocityEstimator:
         """Forget every count: the next one is the first."""
         self._states: list[tuple] = []
         self._shape: tuple[int, ...] | None = None
-        self._last = self._origin = np.zeros(0, np.int64)
+        self._last = np.zeros(0, np.int64)
         self._flags = 0
 
     def set(self, **settings: ArrayLike) -> None:
@@ -193,9 +193,8 @@ class VelocityEstimator:
         return both
 
     def _in_range(self, counts: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-        """Return counts of shape (lanes, samples) as words of the count's width, around the first count of a lane."""
-        first = self._shape is None
-        origin, last = (counts[:, 0], counts[:, 0]) if first else (self._origin, self._last)
+        """Return counts of shape (lanes, samples) as words of the count's width: steps are taken modulo it."""
+        last = counts[:, 0] if self._shape is None else self._last
         whole = unwrapped(np.concatenate([last[:, None], counts], axis=-1), self._bits)
         half = 1 << (self.spec.count_width - 1)
         steps = np.diff(whole, axis=-1)
@@ -206,8 +205,8 @@ class VelocityEstimator:
                 f"counts must change by less than {half} from sample to sample, half of the range that follows from "
                 f"the travel, not by {step} at sample {sample}{f' of lane {lane}' if lane else ''}{cure(step)}"
             )
-        self._shape, self._origin, self._last = shape, origin.copy(), whole[:, -1].copy()
-        return ((whole[:, 1:] - self._origin[:, None] + half) & (2 * half - 1)) - half
+        self._shape, self._last = shape, whole[:, -1].copy()
+        return ((whole[:, 1:] + half) & (2 * half - 1)) - half
 
     def _params(self, shape: tuple[int, ...]) -> list[tuple]:
         """Return the kernel's parameters of every lane."""

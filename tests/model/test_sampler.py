@@ -14,6 +14,7 @@ from hardwall.model import Sampler, stamped
 from hardwall.model.axis.axis import Axis
 from hardwall.model.encoder import quadrature
 from hardwall.model.estimators.registry import ESTIMATORS
+from hardwall.model.sampler import pass_edges
 from hardwall.testing import rng
 from stimuli.lengths import LONG
 from stimuli.specs import PAPER, spec
@@ -80,6 +81,37 @@ def test_edges_come_one_a_clock_and_within_the_sample():
         for _ in range(3):
             sampler((start + 7 * clocks) * COUNT_M)
         assert (sampler.flags, sampler.count) == ([], 7 * clocks)
+
+
+def test_edges_keep_apart_where_floats_put_two_into_one_clock():
+    """An edge a clock, from just before a border on: rounded down, the time of an edge is that of the one before."""
+    clocks, count_m = SPEC.clocks_per_sample, 3e-7
+    fast = replace(SPEC, count_m=count_m, speed_max_m_per_s=20.0, glitch_clocks=0)
+    met = 0
+    for border in range(1, 1000):
+        place = math.nextafter(border * count_m, 0.0)
+        position = place + clocks * count_m
+        shares = [clocks * ((border + k) * count_m - place) / (position - place) for k in range(clocks)]
+        if math.floor(position / count_m) - math.floor(place / count_m) != clocks or min(np.diff(np.floor(shares))) > 0:
+            continue
+        met += 1
+        sampler = Sampler(fast, encoder_glitch_clocks=0)
+        for each in (place, position, position):
+            sampler(each)
+        assert "encoder_illegal" not in sampler.flags
+        assert sampler.count == math.floor(position / count_m)
+    assert met > 0
+
+
+@pytest.mark.parametrize("moved", [1, 2, 7, SPEC.clocks_per_sample])
+@pytest.mark.parametrize("direction", [1, -1])
+def test_no_edge_comes_after_the_sample_that_ends_its_motion(moved, direction):
+    """A motion that ends on a border passes it in the last clock, and the edges before it in clocks before that."""
+    words, state = stamped.controller(Axis(SPEC, encoder_glitch_clocks=0), GRAY[0])
+    places = 4096 * COUNT_M, (4096 + direction * moved) * COUNT_M
+    passed = pass_edges(words, state._replace(clock=100), COUNT_M, places, 100, SPEC.clocks_per_sample)
+    assert 100 < passed.clock <= 100 + SPEC.clocks_per_sample
+    assert not quadrature.fault(passed.decoder)
 
 
 def test_more_edges_than_clocks_are_a_fault_without_a_force():

@@ -63,6 +63,31 @@ def test_pieces_are_the_whole(estimator):
     assert np.concatenate(pieces).tolist() == whole.tolist()
 
 
+@pytest.mark.parametrize("backend", ["fixed", "float"])
+@pytest.mark.parametrize("estimator", SOME)
+def test_a_record_may_have_any_origin(estimator, backend):
+    """Where its counts wrap in the words of the axis is no matter."""
+    motion = replace(MOTION, travel=0.05)
+    half, counts = 1 << (VelocityEstimator(RATE, estimator, motion).spec.count_width - 1), swing()
+    assert np.ptp(counts) > 1000
+    true = VelocityEstimator(RATE, estimator, motion, backend=backend)(counts).tolist()
+    for origin in (half - 500, -half + 500, 3 * half, 2**61):
+        assert VelocityEstimator(RATE, estimator, motion, backend=backend)(counts + origin).tolist() == true
+
+
+def test_pieces_join_at_the_last_count():
+    """From one piece to the next, a count may go as far as within a piece, and no further."""
+    taken = VelocityEstimator(RATE, "fdm", replace(MOTION, speed_max=1.2e4))
+    half = 1 << (taken.spec.count_width - 1)
+    ramp = (half - 1) * np.arange(40)
+    whole = VelocityEstimator(RATE, "fdm", replace(MOTION, speed_max=1.2e4))(ramp)
+    pieces = [taken(ramp[first:last]) for first, last in pairwise([0, 1, 2, 3, 10, 11, 40])]
+    assert np.concatenate(pieces).tolist() == whole.tolist()
+    with pytest.raises(ValueError, match=f"not by {half} at sample 0"):
+        taken(ramp[-1:] + half)
+    assert taken(ramp[-1:]).tolist() == [0.0]
+
+
 def test_a_copy_goes_on_from_the_same_state():
     counts = swing()
     taken = VelocityEstimator(RATE, "window", MOTION)
