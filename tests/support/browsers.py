@@ -41,15 +41,27 @@ class Tab:
         chromium: the browser.
         url: the page's address.
         width, height: the size of its window, pixels.
-        scheme: light or dark.
+        scheme: light or dark; scale: how many pixels of a picture a pixel of the page has.
 
     Attributes:
         page: the page; asked: the addresses that it asked for; errors: what went wrong in it.
     """
 
-    def __init__(self, chromium: Browser, url: str, width: int = 1280, height: int = 1100, scheme: str = "light"):
-        size = {"width": width, "height": height}
-        context = chromium.new_context(viewport=size, color_scheme=scheme, has_touch=width < PHONE)
+    def __init__(
+        self,
+        chromium: Browser,
+        url: str,
+        width: int = 1280,
+        height: int = 1100,
+        scheme: str = "light",
+        scale: float = 1.0,
+    ):
+        context = chromium.new_context(
+            viewport={"width": width, "height": height},
+            color_scheme=scheme,
+            device_scale_factor=scale,
+            has_touch=width < PHONE,
+        )
         self.page: Page = context.new_page()
         self.page.set_default_timeout(1e3 * PATIENCE_S)
         self.asked, self.errors = [], []

@@ -11,7 +11,9 @@ from support.browsers import ABSENT, CHROMIUM, Tab, browser
 from support.processes import HARDWALL, line, started, wait_until
 
 PICTURES = Path(__file__).absolute().parents[2] / "docs" / "pictures"
-WIDTH = round(PAGE_IN * DPI)
+WIDTH, HEIGHT = round(PAGE_IN * DPI), 1250
+CARD, MARGIN = 750, 8
+"""The width of a window whose cards are below each other, and what is above a card in its picture, pixels."""
 STROKES, SPEED_MM_PER_S = 2, 50.0
 """Quick strokes into the wall, and the speed of the slow one behind them, in the board's time."""
 
@@ -31,8 +33,8 @@ FRAME_MS = """async (frames) => {
 """What a frame of the page takes of the browser's processor, ms."""
 
 
-def push(tab: Tab) -> None:
-    """Push the handle into the wall, out and in again, and draw it there."""
+def push(tab: Tab, beside: Tab) -> None:
+    """Push the handle into the wall, out and in again, and draw it there; the traces beside stand still then."""
     with tab.dragged(11):
         tab.until(lambda: tab.sample[4] < -2)
         for stroke in range(2 * STROKES):
@@ -45,8 +47,17 @@ def push(tab: Tab) -> None:
             tab.page.wait_for_timeout(step_ms)
         tab.until(lambda: tab.state == "ARMED" and tab.sample[4] < -2)
         tab.page.screenshot(path=PICTURES / "panel.png")
-        tab.press("pause")
+        beside.press("pause")
         print(f"{tab.text('pace')}; a frame takes {tab.page.evaluate(FRAME_MS, FRAMES):.1f} ms")
+
+
+def draw_card(tab: Tab, name: str) -> None:
+    """Draw a card of the page, as wide as the page."""
+    card = tab.page.locator(f".of-{name}")
+    card.evaluate("(card) => card.scrollIntoView({ block: 'end' })")
+    box = card.bounding_box()
+    clip = {"x": 0, "y": box["y"] - MARGIN, "width": CARD, "height": box["height"] + MARGIN}
+    tab.page.screenshot(path=PICTURES / f"panel-{name}.png", clip=clip)
 
 
 def measure(tab: Tab) -> None:
@@ -55,9 +66,7 @@ def measure(tab: Tab) -> None:
     slider = tab.page.locator("#cursor-b")
     slider.press("PageUp")
     slider.blur()
-    tab.page.locator(".of-traces").screenshot(path=PICTURES / "panel-traces.png")
-    tab.press("pause")
-    tab.press("cursors")
+    draw_card(tab, "traces")
 
 
 def registers(tab: Tab) -> None:
@@ -66,7 +75,7 @@ def registers(tab: Tab) -> None:
     tab.page.locator("#filter").fill("wall_")
     wait_until(lambda: "at most a fifth" in tab.text("rate"))
     tab.page.locator("#filter").blur()
-    tab.page.locator(".of-registers").screenshot(path=PICTURES / "panel-registers.png")
+    draw_card(tab, "registers")
 
 
 def trip(tab: Tab) -> None:
@@ -86,12 +95,12 @@ def main() -> int:
         print(ABSENT, file=sys.stderr)
         return 1
     with started(HARDWALL, "panel", "virtual") as process, browser() as chromium:
-        tab = Tab(chromium, line(process).removeprefix("page: "), WIDTH, 1250)
+        url = line(process).removeprefix("page: ")
+        tab, beside = Tab(chromium, url, WIDTH, HEIGHT), Tab(chromium, url, CARD, HEIGHT, scale=WIDTH / CARD)
         tab.arm()
-        push(tab)
-        measure(tab)
-        registers(tab)
-        tab.page.evaluate("window.scrollTo(0, 0)")
+        push(tab, beside)
+        measure(beside)
+        registers(beside)
         trip(tab)
     for name in ("panel.png", "panel-traces.png", "panel-registers.png", "panel-tripped.png"):
         print(PICTURES / name)
