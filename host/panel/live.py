@@ -126,7 +126,8 @@ class Live:
         number, _ = self._driver.samples_since(0)
         record, _ = estimates.since(0) if estimates else (0, [])
         before: dict[str, Any] = {}
-        used, timed_s, reading = None, 0.0, None
+        used, timed_s = None, 0.0
+        reading: Reading | None = None
         with suppress(WebSocketDisconnect, RuntimeError):
             while True:
                 message: dict[str, Any] = {}
