@@ -4,6 +4,7 @@ import socket
 import threading
 import time
 from contextlib import suppress
+from dataclasses import dataclass
 
 from ..model.axes.registers import BANK
 from ..model.link.board_pace import LOOPBACK, NETWORK
@@ -15,7 +16,9 @@ from .leases import LEASE_OBJECT, NAMED_OBJECT, NO_ANSWER, Guest, Lease, name_of
 from .port import Port
 
 GUESTS_MAX = 32
-"""The most programs at a board."""
+"""The most programs at a board. A further one takes the place of the one that has been silent for longest."""
+IDLE_S = 1.0
+"""The silence behind which a program without the lease may lose its place: `disarm` is to get in."""
 REST_S = 1.0
 """The time behind which what was begun of a request is dropped: the loopback has no such pauses."""
 GRACE_S, BURST = 5e-3, 5
@@ -30,6 +33,15 @@ OWN_S = 0.01
 WRITE_MANY = 16
 CONFORMITY = 0x83
 """The identification has objects of its own."""
+
+
+@dataclass(eq=False)
+class _Program:
+    """A program at the board: its connection, and when it last sent something; its lease once it is served."""
+
+    connection: socket.socket
+    heard_s: float
+    guest: Guest | None = None
 
 
 class Relay:
@@ -69,7 +81,7 @@ class Relay:
         self._busy, self._waiting = False, {True: 0, False: 0}
         # Until when the line is kept for the holder, and how many requests in a row it has had.
         self._kept_s, self._in_a_row = 0.0, 0
-        self._connections: set[socket.socket] = set()
+        self._programs: set[_Program] = set()
         self._ended, self._own_turns = threading.Event(), threading.Lock()
         self._welcoming = threading.Thread(target=self._welcome, name="hardwall-relay", daemon=True)
         self._welcoming.start()
@@ -86,9 +98,8 @@ class Relay:
         with suppress(OSError):
             self._listener.shutdown(socket.SHUT_RDWR)
         self._listener.close()
-        for connection in list(self._connections):
-            with suppress(OSError):
-                connection.shutdown(socket.SHUT_RDWR)
+        for program in list(self._programs):
+            _send_away(program)
         self._port.close()
 
     @property
@@ -111,18 +122,32 @@ class Relay:
                 # It is closed; or this process has as many files as it may have, until a program leaves.
                 self._ended.wait(REST_S)
                 continue
-            if len(self._connections) >= GUESTS_MAX:
+            if len(self._programs) >= GUESTS_MAX and not self._makes_room():
                 connection.close()
                 continue
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._connections.add(connection)
-            threading.Thread(target=self._serve, args=(connection, peer), name="hardwall-guest", daemon=True).start()
+            program = _Program(connection, time.monotonic())
+            self._programs.add(program)
+            threading.Thread(target=self._serve, args=(program, peer), name="hardwall-guest", daemon=True).start()
 
-    def _serve(self, connection: socket.socket, peer: tuple[str, int]) -> None:
+    def _makes_room(self) -> bool:
+        """Send away the program that has been silent for longest, and return true; false if all are busy."""
+        with self._turns:
+            holder = self._lease.holder
+        others = [program for program in list(self._programs) if program.guest is None or program.guest is not holder]
+        idle = min(others, key=lambda program: program.heard_s)
+        if time.monotonic() - idle.heard_s < IDLE_S:
+            return False
+        _send_away(idle)
+        self._programs.discard(idle)
+        return True
+
+    def _serve(self, program: _Program, peer: tuple[str, int]) -> None:
         """Answer a program until it goes."""
+        connection = program.connection
         name = name_of(peer, connection.getsockname())
         with self._turns:
-            guest = self._lease.welcome(name)
+            program.guest = guest = self._lease.welcome(name)
         try:
             with connection, suppress(OSError):
                 begun, rubbish = b"", 0
@@ -135,6 +160,7 @@ class Relay:
                         continue
                     if not data:
                         return
+                    program.heard_s = time.monotonic()
                     begun += data
                     while (size := _size_of(begun)) and len(begun) >= size:
                         request, begun = begun[:size], begun[size:]
@@ -146,7 +172,7 @@ class Relay:
                         rubbish = 0
                         connection.sendall(framed(self._answer(guest, request[:-2])))
         finally:
-            self._connections.discard(connection)
+            self._programs.discard(program)
             with self._turns:
                 self._lease.leave(guest)
 
@@ -216,6 +242,12 @@ class Relay:
         if request[1] not in (WRITE_ONE, WRITE_MANY):
             return False
         return place in self._disarms and count == 1 and request[-2:] == b"\0\1"
+
+
+def _send_away(program: _Program) -> None:
+    """End a program's connection; the thread that serves it sees that, and closes it."""
+    with suppress(OSError):
+        program.connection.shutdown(socket.SHUT_RDWR)
 
 
 def _size_of(begun: bytes) -> int | None:

@@ -22,6 +22,7 @@ from hardwall.host.samples import Samples
 from hardwall.host.status import State
 from hardwall.model.link.line import framed
 from host.twin_board import PATIENT, TwinBoard
+from stimuli import frames
 from support.processes import PATIENCE_S, wait_until
 
 FOR_GOOD = 1 << 30
@@ -268,7 +269,7 @@ def test_a_program_that_sends_nothing_but_rubbish_is_left(relay, monkeypatch):
             answered(line, (relays.RUBBISH_MAX - 1) * spoilt + READ_LAYOUT, 9)
         line.sendall(relays.RUBBISH_MAX * spoilt)
         assert line.recv(1) == b""
-    wait_until(lambda: not relay._connections)
+    wait_until(lambda: not relay._programs)
 
 
 @pytest.mark.parametrize(("request_", "size"), [(bytes([1, 8, 0, 0, 1, 2]), 8), (bytes([1, 0x2B, 14, 4, 0x80]), 12)])
@@ -401,14 +402,32 @@ def test_without_a_holder_all_wait_alike(relay):
     assert len(held.asked) == 4
 
 
-def test_more_programs_than_it_takes_are_sent_away(relay):
+def test_one_program_more_takes_the_place_of_the_one_that_is_silent_for_longest(board, relay, come, monkeypatch):
+    monkeypatch.setattr(relays, "IDLE_S", 0.0)
+    monkeypatch.setattr(leases, "HOLD_S", FOR_GOOD)
+    write = frames.write(board.server.file.design.registers["wall_damping"].address, [0, 1])
+    with ExitStack() as stack:
+        holder, *lines = (stack.enter_context(line_to(relay)) for _ in range(GUESTS_MAX))
+        answered(holder, framed(bytes([1]) + write), 8)
+        for line in lines[::-1]:
+            answered(line, READ_LAYOUT, 9)
+        # Whoever holds the lease keeps its place, however long it has been silent; the others go in their order.
+        come().disarm()
+        assert lines.pop().recv(1) == b""
+        for line in (holder, *lines):
+            assert answered(line, READ_LAYOUT, 9)[:2] == READ_LAYOUT[:2]
+        assert relay.holder
+
+
+def test_more_programs_than_it_takes_are_sent_away_if_all_are_busy(relay, monkeypatch):
+    monkeypatch.setattr(relays, "IDLE_S", FOR_GOOD)
     with ExitStack() as stack:
         lines = [stack.enter_context(line_to(relay)) for _ in range(GUESTS_MAX)]
-        wait_until(lambda: len(relay._connections) == GUESTS_MAX)
+        wait_until(lambda: len(relay._programs) == GUESTS_MAX)
         with line_to(relay) as line:
             assert line.recv(1) == b""
         lines.pop().close()
-        wait_until(lambda: len(relay._connections) < GUESTS_MAX)
+        wait_until(lambda: len(relay._programs) < GUESTS_MAX)
         with line_to(relay) as line:
             assert answered(line, READ_LAYOUT, 9)[:2] == READ_LAYOUT[:2]
 
