@@ -73,7 +73,7 @@ class Config:
         """
         name = shown(path.name or str(path))
         try:
-            found = tomllib.loads(content_of(path, BYTES_MAX).decode("utf-8"))
+            found = tomllib.loads(content_of(path, BYTES_MAX).decode("utf-8-sig"))
         except OSError as error:
             raise ConfigError(f"{name} cannot be read: {error.strerror}") from None
         except (ValueError, RecursionError) as error:

@@ -56,7 +56,7 @@ def read(scene: str) -> str:
     try:
         if not scene.endswith(".toml") and scene not in names():
             raise FileNotFoundError
-        return content_of(_path(scene), BYTES_MAX).decode("utf-8")
+        return content_of(_path(scene), BYTES_MAX).decode("utf-8-sig")
     except FileNotFoundError:
         raise SceneError(f"scene must be one of {', '.join(names())}, or a .toml file, not {shown(scene)}") from None
     except UnicodeDecodeError:

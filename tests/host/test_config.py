@@ -35,6 +35,13 @@ def edited(file, **words: str) -> Config:
     return Config.read(file)
 
 
+def test_a_file_may_begin_with_a_byte_order_mark(file):
+    """As editors on Windows write it."""
+    read = Config.read(file)
+    file.write_text(file.read_text(), encoding="utf-8-sig")
+    assert Config.read(file) == read
+
+
 def words_of(board) -> dict[str, int]:
     return dict(board.server.file.active)
 

@@ -60,6 +60,14 @@ def test_text_that_is_no_scene_is_refused_in_a_short_line(text, said):
     assert len(str(refusal.value)) < 300
 
 
+def test_a_scene_may_begin_with_a_byte_order_mark(tmp_path):
+    """As editors on Windows write it."""
+    for encoding in ("utf-8", "utf-8-sig"):
+        (tmp_path / f"{encoding}.toml").write_text(SEED, encoding=encoding)
+    one, other = (load(str(tmp_path / f"{encoding}.toml")) for encoding in ("utf-8", "utf-8-sig"))
+    assert one.spec == other.spec
+
+
 def test_a_file_that_is_no_regular_one_or_too_large_is_refused(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     os.mkfifo("pipe.toml")
