@@ -364,7 +364,8 @@ def test_what_is_imported_is_what_its_extra_installs(path):
     lists = [CONFIG["project"]["dependencies"], *(EXTRAS[extra] for extra in of_it)]
     installed = {plain(package_of(requirement)) for one in lists for requirement in one}
     installed.add("llvmlite")  # a dependency of Numba
-    pages = (page.stem for page in (ROOT / "docs").glob("*.py"))
+    docs = ROOT / "docs"
+    pages = (page.relative_to(docs).parts[0].removesuffix(".py") for page in docs.rglob("*.py"))
     ours = {"hardwall", *pages, *(test.stem for test in TESTS), *(test.parent.name for test in TESTS)}
     foreign = {name.partition(".")[0] for name in imports(path)} - ours - set(sys.stdlib_module_names)
     assert {name for name in foreign if not installed & {plain(each) for each in PROVIDERS.get(name, [])}} == set()

@@ -51,9 +51,11 @@ def test_one_command_writes_all_of_a_board_for_one_clock(quick, name, tmp_path, 
 def test_a_board_has_the_estimator_and_the_values_that_are_asked_for(quick, tmp_path, monkeypatch, capsys):
     board, changes = BOARDS["icebreaker"], {"controller.estimator": "fdm", "controller.force_max_n": 9.0}
     words = ("--estimator", "fdm", "--set", "controller.force_max_n=9.0")
+    # A short path, for what is printed is held to the width of a terminal.
+    monkeypatch.chdir(tmp_path)
     for scene, its in ((board.scene, board.changes), ("seed-2011", {"controller.clock_hz": 24_000_000})):
         named = () if its is board.changes else (scene, "--set", "controller.clock_hz=24e6")
-        code, _, err = call(monkeypatch, capsys, "verilog", *named, "--board", board.name, *words, "-o", tmp_path)
+        code, _, err = call(monkeypatch, capsys, "verilog", *named, "--board", board.name, *words, "-o", ".")
         assert code == 0, err
         spec = load(scene, its | changes).spec
         assert f'#define HARDWALL_IDENTITY "{RegisterMap(spec).identity}"\n' in (tmp_path / "registers.h").read_text()
