@@ -13,7 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.text import Text
 
 from ..model.runtime.result import Table
-from ..model.runtime.stages import logger
+from ..model.runtime.stages import PATIENCE_S, logger
 from .errors import one_line
 
 log = Console(stderr=True, highlight=False, markup=False)
@@ -120,12 +120,13 @@ def hear_stages() -> None:
 class progress:
     """The progress of a run on stderr: a bar in a terminal, elsewhere a line every `SILENCE_S`.
 
-    As a context it returns the function to call with the amount done. The bar comes with the first amount, so that a
-    run that is refused before leaves one line alone.
+    As a context it returns the function to call with the amount done. The bar comes with the first amount behind
+    `PATIENCE_S`, so that what is refused sooner leaves one line alone.
     """
 
     def __init__(self, title: str, total: int):
         self._title, self._total, self._said = one_line(title), total, time.monotonic()
+        self._begun = self._said
         columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
         self._bar = Progress(*columns, console=log, transient=True, disable=not log.is_terminal)
         self._task = self._bar.add_task(escape(self._title), total=total)
@@ -138,9 +139,10 @@ class progress:
             self._bar.stop()
 
     def _done(self, done: float) -> None:
-        self._bar.start()
-        self._bar.update(self._task, completed=done)
         now = time.monotonic()
+        if now - self._begun >= PATIENCE_S:
+            self._bar.start()
+        self._bar.update(self._task, completed=done)
         if not log.is_terminal and now - self._said >= SILENCE_S:
             self._said = now
             log.print(f"{self._title}: {done / self._total:.0%}")

@@ -93,14 +93,17 @@ def test_what_a_run_says_of_a_name_stays_on_a_line(monkeypatch, capsys):
     assert capsys.readouterr().err == "compiling a\\nb ...\na\\nb.csv: 50%\n"
 
 
-@pytest.mark.parametrize("begun", [False, True])
-def test_a_bar_comes_with_the_first_amount_so_that_what_is_refused_before_is_one_line(monkeypatch, capsys, begun):
+@pytest.mark.parametrize(
+    ("begun", "patience_s", "drawn"), [(False, 0.0, False), (True, 0.0, True), (True, 60.0, False)]
+)
+def test_what_is_refused_soon_is_one_line_without_a_bar(monkeypatch, capsys, begun, patience_s, drawn):
     monkeypatch.setattr(terminal, "log", Console(stderr=True, force_terminal=True))
+    monkeypatch.setattr(terminal, "PATIENCE_S", patience_s)
     with suppress(ValueError), terminal.progress("a.csv", 2) as advance:
         if begun:
             advance(1)
         raise ValueError
-    assert bool(capsys.readouterr().err) == begun
+    assert bool(capsys.readouterr().err) == drawn
 
 
 def test_a_folder_that_went_meanwhile_is_an_error_in_a_line(tmp_path):
