@@ -12,6 +12,8 @@ README, PICTURE = reports.TREE / "README.md", reports.PICTURES / "rate-buys.png"
 ROW = re.compile(r"^\| `([\w-]+)` ([\w-]+) \|([^|]*)\|[^|]*\|[^|]*\|", re.MULTILINE)
 RATES = 10e3, 1e6
 """The sample rates of the two columns, in Hz."""
+FILLED = "accuracy"
+"""The report of the table."""
 DRAWN = "rate-errors", "rate-stiffness"
 """The reports of the picture."""
 
@@ -22,7 +24,7 @@ def filled(text: str) -> str:
     Raises:
         KeyError: if the report has no such estimator.
     """
-    rows = reports.kept("accuracy").report["rows"]
+    rows = reports.kept(FILLED).report["rows"]
     found = {(row["estimator"], row["output"], row["sample_hz"]): row["rms_mm_s"] for row in rows}
 
     def row(match: re.Match) -> str:

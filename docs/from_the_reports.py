@@ -1,4 +1,4 @@
-"""What pages take from `docs/results/reports/`: a line `%report NAME VIEW%` becomes a table of a report, see `views`.
+"""What pages take from `docs/results/reports/`: a line `%report NAME... VIEW%` becomes a table of reports, see `views`.
 
 A report that is not there, a view that is none, or a report that the schema of its command does not know is a warning,
 and so fails the build.
@@ -11,15 +11,15 @@ from sphinx.application import Sphinx
 from sphinx.util import logging
 
 log = logging.getLogger(__name__)
-LINE = re.compile(r"^%report ([\w-]+) ([\w-]+)%$", re.MULTILINE)
+LINE = re.compile(r"^%report ([\w-]+(?: [\w-]+)*) ([\w-]+)%$", re.MULTILINE)
 
 
-def shown(name: str, view: str) -> str:
-    """Return a table of a report, and where it comes from."""
+def shown(names: str, view: str) -> str:
+    """Return a table of reports, and where they come from."""
     try:
-        return "\n".join(views.shown(name, view))
+        return "\n".join(views.shown(names.split(), view))
     except views.UnknownError as error:
-        log.warning("%%report %s %s%%: %s", name, view, error)
+        log.warning("%%report %s %s%%: %s", names, view, error)
         return ""
 
 

@@ -127,11 +127,12 @@ def sources_of(command: str) -> list[Path]:
 
 @functools.cache
 def origin(command: str) -> str:
-    """Return a digest of the code that the report of a command comes from, and of the scenes of the project."""
+    """Return a digest of the code that a command's report comes from, of the project's scenes, and of its own scene."""
     digest = hashlib.sha256()
     for file in sources_of(command):
         digest.update(f"{file.relative_to(TREE)}\0{code_of(file.read_bytes())}\0".encode())
-    for scene in sorted((TREE / "sim/scene/builtin").glob("*.toml")):
+    own = (TREE / word for word in shlex.split(command) if word.endswith(".toml"))
+    for scene in (*sorted((TREE / "sim/scene/builtin").glob("*.toml")), *own):
         digest.update(scene.read_bytes())
     return digest.hexdigest()[:16]
 
@@ -157,13 +158,20 @@ def make(report: Wanted) -> Kept:
         machine=machine(),
         origin=came_from,
         seconds=round(time.monotonic() - began, 1),
-        report=json.loads(done.stdout),
+        # A folder of the build is named from the checkout on.
+        report=json.loads(done.stdout.replace(f"{TREE}/", "")),
     )
     KEPT.mkdir(exist_ok=True)
     unfinished = KEPT / f"{report.name}.new"
-    unfinished.write_text(json.dumps(asdict(made), indent=1) + "\n", encoding="utf-8")
+    unfinished.write_text(_text_of(made), encoding="utf-8")
     unfinished.replace(KEPT / f"{report.name}.json")
     return made
+
+
+def _text_of(made: Kept) -> str:
+    """Return a report as it is kept: a line for each key, and one for all that the command said, which may be long."""
+    lines = (f" {json.dumps(key)}: {json.dumps(value, separators=(',', ':'))}" for key, value in asdict(made).items())
+    return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
 def main() -> None:

@@ -25,9 +25,9 @@ def test_every_report_that_is_wanted_is_kept_and_shown():
     assert {path.stem for path in reports.KEPT.iterdir()} == {*WANTED}
     pages = "".join(map(text_of, PAGES))
     pictures = {name: each.picture for name, each in WANTED.items()} | dict.fromkeys(for_readme.DRAWN, "rate-buys.png")
-    assert [
-        name for name in WANTED if not re.search(rf"%report {name} |pictures/{pictures[name] or '-'}\)", pages)
-    ] == []
+    shown = {name for line in re.findall(r"^%report (.*) [\w-]+%$", pages, re.MULTILINE) for name in line.split()}
+    shown |= {for_readme.FILLED} | {name for name, picture in pictures.items() if f"pictures/{picture})" in pages}
+    assert {*WANTED} == shown
 
 
 @pytest.mark.parametrize("name", KEPT)
@@ -100,26 +100,45 @@ def test_numbers_have_as_many_digits_as_matter():
 
 def test_a_page_shows_a_report_where_it_comes_from_and_that_it_is_stale(monkeypatch):
     monkeypatch.setattr(reports, "is_stale", lambda wanted: False)
-    lines = views.shown("accuracy", "errors-by-rate")
-    assert lines[0].count("|") == lines[1].count("|") == 6
-    (row,) = (line for line in lines if line.startswith("| `kalman` u | "))
-    errors = [each["rms_mm_s"] for each in KEPT["accuracy"].report["rows"] if each["estimator"] == "kalman"]
-    shown = [float(cell) for cell in row.strip("| ").split(" | ")[1:]]
-    assert sorted(shown) == pytest.approx(sorted(errors), rel=5e-3)
-    assert f"`{KEPT['accuracy'].command}`, version {KEPT['accuracy'].version}" in lines[-2]
-    assert "Stale" not in lines[-2]
+    lines = views.shown(["situations"], "situations")
+    assert lines[0].count("|") == lines[1].count("|") == 8
+    (row,) = (line for line in lines if line.startswith("| `kalman` | "))
+    errors = [each["rms_mm_s"] for each in KEPT["situations"].report["rows"] if each["estimator"] == "kalman"]
+    assert [float(cell) for cell in row.strip("| ").split(" | ")[1:-1]] == pytest.approx(errors, rel=5e-2)
+    assert f"`{KEPT['situations'].command}`, version {KEPT['situations'].version}" in lines[-2]
+    assert not any("Stale" in line for line in lines)
     monkeypatch.setattr(reports, "is_stale", lambda wanted: True)
-    assert "**Stale: its sources have changed since.**" in views.shown("accuracy", "errors-by-rate")[-2]
+    assert "**Stale: its sources have changed since.**" in views.shown(["situations"], "situations")
+
+
+def test_a_table_of_several_reports_names_the_commands_by_what_differs(monkeypatch):
+    monkeypatch.setattr(reports, "is_stale", lambda wanted: wanted.name == "friction-twice")
+    names = ["friction-usual", "friction-half", "friction-twice"]
+    lines = views.shown(names, "frictions")
+    assert lines[0].count("|") == len(KEPT[names[0]].report["maps"]) + 2
+    assert [line.split("|")[1].strip() for line in lines[2:5]] == ["the scene's, 0.1 N", "0.05 N", "0.2 N"]
+    (made,) = (line for line in lines if line.startswith("*`"))
+    assert f"`{KEPT[names[0]].command}`" in made
+    assert made.endswith("Also with `handle.coulomb_n=0.05`, `handle.coulomb_n=0.2`.*")
+    assert lines[-2] == "**Stale: its sources have changed since.**"
+
+
+def test_every_table_of_a_page_is_whole_and_narrow():
+    for names, view in re.findall(r"^%report (.*) ([\w-]+)%$", "\n".join(map(text_of, PAGES)), re.MULTILINE):
+        rows = [line for line in views.shown(names.split(), view) if line.startswith("|")]
+        assert len({row.count("|") for row in rows}) == 1, view
+        assert len(rows) > 2, view
+        assert rows[0].count("|") <= 10, view
 
 
 def test_a_report_that_is_not_known_is_not_shown(monkeypatch):
     for name, view, said in (
-        ("none", "errors-by-rate", "no such report"),
+        ("none", "situations", "no such report"),
         ("accuracy", "none", "the view must be one"),
     ):
         with pytest.raises(views.UnknownError, match=said):
-            views.shown(name, view)
+            views.shown([name], view)
     wrong = replace(KEPT["accuracy"], report={"rows": [{}]})
     monkeypatch.setattr(reports, "kept", lambda name: wrong)
     with pytest.raises(views.UnknownError, match=r"^accuracy: \$\.rows"):
-        views.shown("accuracy", "errors-by-rate")
+        views.shown(["accuracy"], "situations")

@@ -15,8 +15,6 @@ from support.pages import PAGES, ROOT
 SITE = ROOT / "build/docs"
 SHOWN = "index", "guide/start", "guide/motor", "results/estimators", "reference/scenes"
 """The pages of which pictures are kept."""
-TYPED = "results/estimators", "results/trade", "results/walls"
-"""Pages with tables that were typed, some of which are wider; those that come from reports are not."""
 SCREEN, PHONE = 1280, 390
 """Widths in pixels."""
 TOO_WIDE = """() => [...document.querySelectorAll('.table-wrapper')].filter(e => e.scrollWidth > e.clientWidth + 1)
@@ -42,7 +40,7 @@ def test_nothing_scrolls_sideways(chromium, width):
     wide = {}
     for name in NAMES:
         tab.goto((SITE / f"{name}.html").as_uri())
-        found = tab.evaluate(TOO_WIDE) if width == SCREEN and name not in TYPED else []
+        found = tab.evaluate(TOO_WIDE) if width == SCREEN else []
         if tab.evaluate(BEYOND) > 0:
             found.append("the page itself")
         if found:

@@ -1,43 +1,90 @@
-"""How pages show the reports of commands: each view makes the lines of a Markdown table of one."""
+"""How pages show the reports of commands: each view makes the lines of a Markdown table of one report or of several."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import reports
 
 from support.reports import check
 
-from . import accuracy, rendered
-from .tables import Report
+from . import accuracy, hardware, rendered, trade, walls
 
 
 class UnknownError(Exception):
     """There is no such report or view, or the schema of the report's command does not describe it."""
 
 
-VIEWS: dict[str, Callable[[Report], list[str]]] = {
-    "errors-by-rate": accuracy.errors_by_rate,
+VIEWS: dict[str, Callable[..., list[str]]] = {
+    "situations": accuracy.situations,
+    "encoders": accuracy.encoders,
+    "learned": accuracy.learned,
+    "published": accuracy.published,
+    "regions": walls.maps,
+    "facts": walls.facts,
+    "devices": walls.devices,
+    "frictions": walls.frictions,
+    "hands": walls.hands,
+    "cutoffs": walls.cutoffs,
+    "gains": walls.gains,
+    "cures": walls.cures,
+    "stiffest": walls.stiffest,
+    "same-verdicts": walls.same_verdicts,
     "late-damping": rendered.late_damping,
     "bandwidth": rendered.bandwidth,
     "every-output": rendered.every_output,
     "contact": rendered.contact,
+    "parts": trade.parts,
+    "shortcuts": trade.shortcuts,
+    "speed": trade.speed,
+    "waiting": trade.waiting,
+    "costs-of-parts": trade.costs_of_parts,
+    "costs": hardware.costs,
+    "placed": hardware.placed,
+    "axes": hardware.axes,
+    "bits": hardware.bits,
 }
+"""The views: each takes the reports that a page names, in their order."""
 
 
-def shown(name: str, view: str) -> list[str]:
-    """Return the lines of a report's table, and where the report comes from.
+def shown(names: Sequence[str], view: str) -> list[str]:
+    """Return the lines of a table of reports, and where the reports come from.
 
     Raises:
         UnknownError: see there.
     """
-    wanted, found = reports.wanted().get(name), reports.kept(name)
-    if wanted is None or found is None:
-        raise UnknownError("no such report was made")
+    every = [_kept(name) for name in names]
     if view not in VIEWS:
         raise UnknownError(f"the view must be one of {', '.join(VIEWS)}")
+    return [*VIEWS[view](*(each.report for each in every)), "", *_made(every), *_stale(names), ""]
+
+
+def _kept(name: str) -> reports.Kept:
+    """Return a report of which the schema of its command knows every key."""
+    found = reports.kept(name)
+    if name not in reports.wanted() or found is None:
+        raise UnknownError(f"no such report was made: {name}")
     try:
         check(found.command.split()[1], found.report)
     except AssertionError as error:
         raise UnknownError(str(error)) from None
-    made = f"`{found.command}`, version {found.version}, {found.date}, {found.machine}; it took {found.seconds:.0f} s."
-    stale = " **Stale: its sources have changed since.**" if reports.is_stale(wanted) else ""
-    return [*VIEWS[view](found.report), "", f"*{made}*{stale}", ""]
+    return found
+
+
+def _made(every: Sequence[reports.Kept]) -> list[str]:
+    """Return a line that says which commands made reports: the first whole, of the others the words that differ."""
+    first, *others = every
+    known, differing = {*first.command.split()}, []
+    for each in others:
+        differing.append(f"`{' '.join(word for word in each.command.split() if word not in known)}`")
+        known |= {*each.command.split()}
+    also = f" Also with {', '.join(differing)}." if others else ""
+    dates = " to ".join(dict.fromkeys((min(each.date for each in every), max(each.date for each in every))))
+    seconds = sum(each.seconds for each in every)
+    return [f"*`{first.command}`, version {first.version}, {dates}, {first.machine}; it took {seconds:.0f} s.{also}*"]
+
+
+def _stale(names: Sequence[str]) -> list[str]:
+    """Return a line if the sources of a report have changed."""
+    wanted = reports.wanted()
+    if any(reports.is_stale(wanted[name]) for name in names):
+        return ["", "**Stale: its sources have changed since.**"]
+    return []

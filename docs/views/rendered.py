@@ -100,7 +100,7 @@ def contact(report: Report) -> list[str]:
         heads,
         (
             [
-                _rate(row),
+                _rate(row).split(",")[0],
                 *(spread(each, "rate_hardness_n_per_m", 1e3) for each in row["contact"]),
                 spread(row["contact"][middle], "first_n"),
                 spread(row["contact"][middle], "first_s", 1e-3),

@@ -9,6 +9,7 @@ from ..estimates.accuracy import axis_spec, encoder_of, errors_of, exact_velocit
 from ..estimates.figures import lower_bound_m_per_s, window_floor_m_per_s
 from ..estimates.playback import velocities
 from ..studies.accuracy import Accuracy
+from ..studies.rendered_setting import rate_text
 from ..walls.methods import Curve
 from .labels import label_right
 from .style import LABEL_PT, MARK, THEORY, TRUTH, ink, looks, name_above, new_figure, page
@@ -95,8 +96,8 @@ def _against_rate(rows: list[dict], labels: list[str]) -> Figure:
     encoder = f", encoder out of phase by {phase:g} counts" if phase else ""
     if "encoder" in first:
         encoder = f",\nencoder with {said_of(encoder_of(first))}"
-    title = f'RMS error on the signal "{first["signal"]}", counts of 1 µm, {first["backend"]}{encoder}'
-    picture = new_figure(6.0, title)
+    said = f'RMS error on the signal "{first["signal"]}", counts of 1 µm, {first["backend"]}{encoder}'
+    picture = new_figure(6.0, _message(rows, labels) + said)
     axes = picture.subplots()
     curves = {label: (row["estimator"], row["output"]) for row, label in zip(rows, labels, strict=True)}
     ends = []
@@ -118,6 +119,18 @@ def _against_rate(rows: list[dict], labels: list[str]) -> Figure:
     axes.set_ylim(*axes.get_ylim())
     label_right(axes, ends)
     return picture
+
+
+def _message(rows: list[dict], labels: list[str]) -> str:
+    """Return whose error grows most with the rate, and whose is the least, as a line of the title; of one rate none."""
+    first, last = (pick(row["sample_hz"] for row in rows) for pick in (min, max))
+    errors = {(label, row["sample_hz"]): row["rms_mm_s"] for row, label in zip(rows, labels, strict=True)}
+    if first == last or not all((label, hz) in errors for label in labels for hz in (first, last)):
+        return ""
+    times = {label: errors[label, last] / max(errors[label, first], LEAST_MM_S) for label in labels}
+    worst, best = max(times, key=times.__getitem__), min(labels, key=lambda label: errors[label, last])
+    ends = f"from {rate_text(first)} to {rate_text(last)}"
+    return f"{best} has the least error at {rate_text(last)}; that of {worst} grows {times[worst]:.3g} times {ends}\n"
 
 
 def _bounds(axes: Axes, rows: list[dict]) -> list[tuple[str, float, str]]:

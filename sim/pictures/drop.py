@@ -25,18 +25,11 @@ from .style import (
 
 OUTSIDE = ("mass", "count", "delay", "stiffness")
 """The changed quantities that are not in the law."""
-KINDS = {
-    "changed: friction, push, gains, samples a force": (
-        lambda factor: factor not in (*OUTSIDE, "none"),
-        {"marker": "o", "color": COLOURS["levant"], "ms": 5},
-    ),
-    f"changed, not in the law: {', '.join(OUTSIDE)}": (
-        lambda factor: factor in OUTSIDE,
-        {"marker": "s", "color": COLOURS["butterworth"], "mfc": "none", "ms": 6},
-    ),
-    "as it is": (lambda factor: factor == "none", {"marker": "D", "color": "black", "ms": 5}),
-}
-"""The styles of the changed quantities, by label: which factors are meant, and how they are drawn."""
+LAWS = (
+    {"marker": "o", "color": COLOURS["levant"], "ms": 5},
+    {"marker": "s", "color": COLOURS["butterworth"], "ms": 5},
+)
+"""The styles of the paper's two gains."""
 BAND = 2.0
 """The factor of error above which a law is labelled with its name."""
 COLUMNS = 3
@@ -122,42 +115,45 @@ def _finite(law: Law) -> bool:
 
 
 def _law(drop: Drop) -> Figure:
-    """Return the picture of the law: measured against predicted B, one change at a time, a panel for every method."""
+    """Return the picture of the law: measured against predicted B, one change at a time; far ones are named."""
+    known = [each for each in drop.laws if each.method in PAPERS and _finite(each)]
+    inside = [each for each in known if each.factor not in (*OUTSIDE, "none")]
+    right = [each for each in inside if _is_near(each)]
     title = (
-        "Up to which B the handle comes to rest: predicted from the estimator alone, measured in the closed loop\n"
-        f"{_setting(drop)}; one thing changed at a time"
+        f"Where rest ends is predicted from the estimator alone: within a factor of {BAND:g} in {len(right)} of "
+        f"{len(inside)} loops\n{_setting(drop)}; one thing changed at a time"
     )
     picture = new_figure(4.9, title)
-    panels = picture.subplots(1, len(PAPERS), sharex=True, sharey=True)
-    known = [each for each in drop.laws if each.method in PAPERS and _finite(each)]
+    axes = picture.subplots()
     ends = [value for each in known for value in _spot(each)] or [1.0, 2.0]
     line = np.array([min(ends) / 1.5, max(ends) * 1.5])
-    for axes, name in zip(panels, PAPERS, strict=True):
-        axes.fill_between(line, line / BAND, line * BAND, color="0.92", lw=0, label=f"within a factor of {BAND:g}")
-        axes.plot(line, line, color="black", lw=1, label="measured = predicted")
-        own = [each for each in known if each.method == name]
-        for label, (chosen, style) in KINDS.items():
-            spots = [_spot(each) for each in own if chosen(each.factor)]
-            axes.plot(*np.array(spots).reshape(-1, 2).T, ls="", label=label, **style)
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        plain_decades(axes.xaxis)
-        plain_decades(axes.yaxis)
-        axes.set_xlim(*line)
-        axes.set_ylim(*line)
-        axes.set_title(drop.maps[name].case.label)
-        axes.set_xlabel("predicted: B (N s/m)")
-    panels[0].set_ylabel("measured: B (N s/m)")
-    picture.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    axes.fill_between(line, line / BAND, line * BAND, color="0.92", lw=0)
+    axes.plot(line, line, color="black", lw=1)
+    for name, style in zip(PAPERS, LAWS, strict=True):
+        for changed, filled in ((True, {}), (False, {"mfc": "none"})):
+            spots = [_spot(each) for each in known if each.method == name and (each.factor not in OUTSIDE) == changed]
+            what = "" if changed else f"; changed: {', '.join(OUTSIDE)}, not in the law"
+            label = f"{drop.maps[name].case.label}{what}"
+            axes.plot(*np.array(spots).reshape(-1, 2).T, ls="", label=label, **style | filled)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    plain_decades(axes.xaxis)
+    plain_decades(axes.yaxis)
+    axes.set_xlim(*line)
+    axes.set_ylim(*line)
+    axes.set_xlabel("predicted: the handle rests up to B (N s/m)")
+    axes.set_ylabel("measured in the loop: B (N s/m)")
+    picture.legend(*axes.get_legend_handles_labels(), loc="outside lower left", frameon=False)
     lay_out(picture)
-    for axes, name in zip(panels, PAPERS, strict=True):
-        own = [each for each in known if each.method == name]
-        far = [each for each in own if not 1 / BAND <= each.measured_n_s_per_m / each.predicted_n_s_per_m <= BAND]
-        labels = [(f"{each.factor} {each.value}", _spot(each), "black") for each in far]
-        label_points(
-            axes, labels, avoid=[_spot(each) for each in own if each not in far], lines=[[(x, x) for x in line]]
-        )
+    far = [each for each in known if not _is_near(each)]
+    labels = [(f"{each.factor} {each.value}", _spot(each), "black") for each in far]
+    label_points(axes, labels, avoid=[_spot(each) for each in known if each not in far], lines=[[(x, x) for x in line]])
     return picture
+
+
+def _is_near(law: Law) -> bool:
+    """Return whether a measured B is within the band around the predicted one."""
+    return 1 / BAND <= law.measured_n_s_per_m / law.predicted_n_s_per_m <= BAND
 
 
 def _spot(law: Law) -> tuple[float, float]:

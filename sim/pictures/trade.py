@@ -1,4 +1,6 @@
-"""The picture of speed against accuracy: the time of a map, and how far every setting moves its edge."""
+"""The picture of what moves the edge of the stable walls: the area with every setting that moves it, beside chance."""
+
+import math
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -6,92 +8,98 @@ from matplotlib.figure import Figure
 from ..studies.shortcuts import SCATTER
 from ..studies.trade import Point, Trade
 from ..walls import methods
-from .labels import label_points
-from .style import COLOURS, LABEL_PT, THEORY, lay_out, new_figure, page, plain_decades
+from .style import LABEL_PT, THEORY, ink, lay_out, looks, new_figure, page
 
-NAMED = 9
-"""The largest number of settings of a panel that are labelled."""
-BEST, PLAIN, SAME = COLOURS["butterworth"], "0.25", "0.65"
-MOST = 3.0
+ROWS = 12
+"""The largest number of settings that are drawn: those that move the edge most."""
+MOST = 4.0
 """The ratio of areas at which an interval is cut off that has no end, or a far one."""
+LEAST = 0.05
+"""The ratio of areas at which an interval is cut off that goes on to zero."""
+TICKS = 0.1, 0.2, 0.5, 1, 2, 4
+"""The ratios of areas that an axis names."""
+APART = 0.3
+"""The distance of two estimators in a row, in rows."""
 
 
 @page
 def draw(trade: Trade) -> Figure:
-    """Return a panel for every estimator: the area of a setting's map over the reference's, against time."""
+    """Return a row for every setting that moves the edge: the areas of the estimators over the reference's."""
+    rows = moving(trade)
     controller, grid = trade.scene.controller, trade.scene.zwidth
     title = (
-        f"What moves the edge of the stable walls, and what it costs\n{trade.scene.name}: samples at "
+        f"{_message(rows)}\n{trade.scene.name}: samples at "
         f"{controller.sample_hz / 1e3:g} kHz, force at {controller.actuation_hz / 1e3:g} kHz; "
         f"B of {grid.damping_from_n_s_per_m:g} to {grid.damping_to_n_s_per_m:g} N s/m, K by "
         f"{grid.stiffness_step_n_per_m / 1e3:g} kN/m, {trade.starts} starts"
     )
-    picture = new_figure(0.9 + 3.4 * len(trade.labels), title)
-    panels = picture.subplots(len(trade.labels), sharex=True, squeeze=False)[:, 0]
-    for axes, label in zip(panels, trade.labels, strict=True):
-        axes.set_title(methods.methods()[label].label)
-        axes.set_ylabel("area (of that with all parts)")
-        _draw(axes, trade, label)
-    panels[-1].set_xlabel("time of both maps, in one process (s)")
-    picture.align_ylabels(panels)
+    picture = new_figure(1.5 + 0.3 * len(rows), title)
+    axes = picture.subplots()
+    curves = [methods.methods()[label] for label in trade.labels]
+    styles = looks([(curve.estimator, curve.output) for curve in curves])
+    for number, (label, curve, style) in enumerate(zip(trade.labels, curves, styles, strict=True)):
+        shift = APART * (number - (len(curves) - 1) / 2)
+        _draw(axes, [point.moves[label] for point in rows], shift, style | {"label": curve.label})
+    axes.axvline(1, color=THEORY, lw=1, zorder=1)
+    axes.set_xscale("log")
+    low, high = axes.get_xlim()
+    ticks = [each for each in TICKS if low <= each <= high]
+    axes.set_xticks(ticks, [f"{each:g}" for each in ticks])
+    axes.set_xlim(low, high)
+    axes.minorticks_off()
+    axes.set_yticks(range(len(rows)), [point.shortcut.label for point in rows])
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.grid(visible=False, axis="y")
+    axes.set_xlabel("area of the stable walls, of that with all parts (ratio)")
+    for text, color in zip(_names(axes), [ink(curve.estimator) for curve in curves], strict=True):
+        text.set_color(color)
     notes = (
-        "bars: 95 of 100 draws of the starts; grey: the same area, as far as these tell\n"
-        "blue: no map is both faster and as surely right; those without a name are in the command's table"
+        "bars: 95 of 100 draws of the starts; the last row, of handles hardly heavier or lighter, is what chance does"
     )
     picture.supxlabel(notes, x=0.01, ha="left", fontsize=LABEL_PT, color=THEORY)
     lay_out(picture)
-    for axes, label in zip(panels, trade.labels, strict=True):
-        _name(axes, trade, label)
     return picture
 
 
-def named(trade: Trade, label: str) -> list[Point]:
-    """Return the points of a panel that are labelled, at most `NAMED`.
-
-    They are the reference, the best, and of the others those that move the edge most.
-    """
-    others = [point for point in trade.points if point.shortcut.axis != SCATTER]
-    chosen = [trade.points[0], *trade.best(label), *sorted(others, key=lambda point: -abs(point.moves[label].area - 1))]
-    distinct = [point for number, point in enumerate(chosen) if point not in chosen[:number]]
-    return distinct[:NAMED]
+def moving(trade: Trade) -> list[Point]:
+    """Return the points that are drawn: single settings that move an edge, by their areas, and the worst control."""
+    single = [point for point in trade.points[1:] if " + " not in point.shortcut.label]
+    controls = [point for point in single if point.shortcut.axis == SCATTER]
+    moved = [point for point in single if point not in controls and any(move.moved for move in point.moves.values())]
+    chosen = sorted(moved, key=_farthest)[-ROWS:]
+    return [*sorted(chosen, key=_area, reverse=True), *sorted(controls, key=_farthest)[-1:]]
 
 
-def _colour(point: Point, best: list[Point], label: str) -> str:
-    return BEST if point in best else PLAIN if point.moves[label].moved else SAME
+def _farthest(point: Point) -> float:
+    """Return by how much a setting moves the edge of some estimator, as a logarithm."""
+    return max(abs(math.log(max(move.area, LEAST))) for move in point.moves.values())
 
 
-def _draw(axes: Axes, trade: Trade, label: str) -> None:
-    """Draw the points of a panel with their intervals, and the line of the reference."""
-    best = trade.best(label)
-    axes.axhline(1, color="0.85", lw=1, zorder=0)
-    for point in trade.points:
-        move, colour = point.moves[label], _colour(point, best, label)
-        below, above = max(move.area - move.low, 0), max(min(move.high, MOST) - move.area, 0)
-        axes.errorbar(
-            *(point.map_s, move.area),
-            yerr=[[below], [above]],
-            fmt="o",
-            ms=5,
-            color=colour,
-            ecolor=colour,
-            elinewidth=0.8,
-        )
-    axes.set_xscale("log")
-    plain_decades(axes.xaxis)
-    moves = [point.moves[label] for point in trade.points]
-    most = max(max(move.area, min(move.high, MOST)) for move in moves)
-    least = min(move.low for move in moves)
-    room = 0.12 * (most - least) + 0.02
-    axes.set_ylim(least - room, most + room)
-    axes.margins(x=0.12)
+def _area(point: Point) -> float:
+    """Return the product of a setting's areas: the settings are shown in this order."""
+    return math.prod(max(move.area, LEAST) for move in point.moves.values())
 
 
-def _name(axes: Axes, trade: Trade, label: str) -> None:
-    """Write labels beside the points of a panel."""
-    best, names = trade.best(label), named(trade, label)
+def _message(rows: list[Point]) -> str:
+    """Return which of some settings gives the largest area, and which takes most, as a title."""
+    moved = [point for point in rows if point.shortcut.axis != SCATTER]
+    areas = [(move.area, point.shortcut.label) for point in moved for move in point.moves.values()]
+    if not areas:
+        return "No setting moves the edge of the stable walls"
+    (most, gain), (least, loss) = max(areas), min(areas)
+    return f"Most walls are stable {gain} ({most:.2g} times the area); fewest: {loss} ({least:.2g} times)"
 
-    def spot(point: Point) -> tuple[float, float]:
-        return point.map_s, point.moves[label].area
 
-    labels = [(point.shortcut.label, spot(point), _colour(point, best, label)) for point in names]
-    label_points(axes, labels, avoid=[spot(point) for point in trade.points if point not in names])
+def _draw(axes: Axes, moves: list, shift: float, style: dict) -> None:
+    """Draw the areas of an estimator with their intervals, a row each."""
+    places = [row + shift for row in range(len(moves))]
+    areas = [min(max(move.area, LEAST), MOST) for move in moves]
+    below = [max(area - max(move.low, LEAST), 0) for area, move in zip(areas, moves, strict=True)]
+    above = [max(min(move.high, MOST) - area, 0) for area, move in zip(areas, moves, strict=True)]
+    axes.errorbar(areas, places, xerr=[below, above], elinewidth=1.0, **style | {"ls": "", "ms": 5})
+
+
+def _names(axes: Axes) -> list:
+    """Write the names of the estimators above the panel; return their texts."""
+    legend = axes.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=2, frameon=False, borderaxespad=0.2)
+    return legend.get_texts()

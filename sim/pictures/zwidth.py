@@ -30,7 +30,7 @@ def draw(found: ZWidth) -> Figure:
     scenes = [each.case.scene for each in maps]
     scene, controller, grid = scenes[0], scenes[0].controller, grid_of(scenes[0])
     through = "" if scene.coupling is None else f" behind {scene.coupling.stiffness_n_per_m / 1e3:g} kN/m"
-    title = (
+    title = _message(maps) + (
         f"{scene.name}{through}: samples at {controller.sample_hz / 1e3:g} kHz, "
         f"force at {controller.actuation_hz / 1e3:g} kHz; "
         f"map in steps of {grid.stiffness_step_n_per_m / 1e3:g} kN/m, {grid.damping_step_n_s_per_m:.3g} N s/m"
@@ -43,8 +43,8 @@ def draw(found: ZWidth) -> Figure:
     for each, boundary, limit, style in zip(maps, boundaries, limits, styles, strict=True):
         label = f"{each.case.label}: {each.area / 1e3:.0f}"
         axes.plot(*zip(*boundary, strict=True), label=label, **style | {"ms": 3.5})
-        low, high = np.array(each.intervals).T / 1e3
-        dampings = [point.damping_n_s_per_m for point in each.boundary]
+        low, high = np.array(each.intervals[: len(boundary)]).T / 1e3
+        dampings = [damping for damping, _ in boundary]
         axes.fill_between(dampings, low, high, color=style["color"], alpha=BAND, lw=0)
         if limit and np.isfinite(limit).any():
             axes.plot(grid.dampings, np.array(limit) / 1e3, color=style["color"], ls=":", lw=1.1)
@@ -79,6 +79,17 @@ def draw(found: ZWidth) -> Figure:
         lay_out(picture)
         label_points(axes, labels, lines=[*dotted, border])
     return picture
+
+
+def _message(maps: Sequence[Map]) -> str:
+    """Return which of several methods has the largest region, how much larger than the next, as a line of the title."""
+    if len(maps) == 1 or maps[0].variants:
+        return ""
+    largest, next_one = sorted(maps, key=lambda each: each.area)[:-3:-1]
+    if not next_one.area:
+        return f"Only {largest.case.label} has stable walls\n"
+    times = f"{largest.area / next_one.area:.2f} times that of {next_one.case.label}"
+    return f"{largest.case.label} has the largest region of stable walls: {times}\n"
 
 
 def _until_it_ends(each: Map) -> list[tuple[float, float]]:

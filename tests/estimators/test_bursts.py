@@ -272,8 +272,8 @@ def test_bursts_are_found_at_the_third(name, in_a_burst):
 
 
 def test_the_times_are_those_of_the_page():
-    page = (Path(__file__).parents[2] / "docs/results/estimators.md").read_text(encoding="utf-8")
-    part = page[page.index("### Edges in bursts") :]
+    page = (Path(__file__).parents[2] / "docs/reference/estimators.md").read_text(encoding="utf-8")
+    part = page[page.index("## Edges in bursts") :]
     axis = spec("mhz", "mt")
     assert f"within {(limits(axis).span + 1) / axis.clock_hz * 1e6:.1f} us" in part
     assert f"less than {STEEPER * axis.acceleration_max_m_per_s2:g} m/s" in part

@@ -33,6 +33,7 @@ from hardwall.sim.pictures import replay as replayed
 from hardwall.sim.pictures.style import PAGE_IN, lay_out, save
 from hardwall.sim.studies.accuracy import Accuracy
 from hardwall.sim.studies.published import LOOPS
+from hardwall.sim.studies.shortcuts import SCATTER
 from stimuli import results
 from stimuli.lengths import LONG
 from stimuli.replays import BOUND, COARSEN, swing
@@ -303,24 +304,28 @@ def test_a_hit_says_how_it_settled_in_digits_that_count(rms_m, text):
 
 
 @pytest.mark.parametrize("picture", ["trade"], indirect=True)
-def test_a_panel_of_the_trade_names_its_best_and_few_others(picture):
+def test_the_trade_names_the_settings_that_move_an_edge_most_and_chance_beside_them(picture):
     made = results.traded()
-    assert len(picture.axes) == len(made.labels)
-    for axes, label in zip(picture.axes, made.labels, strict=True):
-        labels = {point.shortcut.label for point in made.points}
-        names = [text.get_text() for text in axes.texts if text.get_text() in labels]
-        assert 2 <= len(names) == len(set(names)) <= trade.NAMED
-        best = made.best(label)
-        assert {best[0].shortcut.label, best[-1].shortcut.label, made.points[0].shortcut.label} <= set(names)
-        assert not any(text.isdigit() for text in names)
+    rows = [text.get_text() for text in picture.axes[0].get_yticklabels()]
+    *moving, control = trade.moving(made)
+    assert rows == [point.shortcut.label for point in (*moving, control)]
+    assert len(moving) == trade.ROWS
+    assert control.shortcut.axis == SCATTER
+    assert all(any(move.moved for move in point.moves.values()) for point in moving)
+    assert not any(" + " in row for row in rows)
+    title = picture.get_suptitle()
+    most, least = (pick(move.area for point in moving for move in point.moves.values()) for pick in (max, min))
+    assert f"({most:.2g} times the area)" in title
+    assert f"({least:.2g} times)" in title
 
 
-def test_an_area_that_is_far_from_the_others_is_on_its_panel():
+def test_an_area_that_is_far_from_the_others_is_on_the_panel():
     made = results.traded()
     far = made.points[3]
-    far.moves["adjusted"] = far.moves["adjusted"]._replace(area=4.0, high=float("inf"))
-    low, high = trade.draw(made).axes[0].get_ylim()
-    assert low < 4.0 < high < 5.0
+    far.moves["adjusted"] = far.moves["adjusted"]._replace(area=9.0, low=8.0, high=float("inf"))
+    axes = trade.draw(made).axes[0]
+    low, high = axes.get_xlim()
+    assert low < trade.MOST < high < 2 * trade.MOST
 
 
 @pytest.mark.parametrize("picture", ["zwidth"], indirect=True)

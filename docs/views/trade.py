@@ -1,0 +1,86 @@
+"""Tables of `hardwall trade` and `hardwall bench`."""
+
+from typing import Any
+
+from hardwall.sim.walls.methods import methods
+
+from .tables import Report, number, table
+
+Setting = dict[str, Any]
+BACKENDS = {
+    "float": "the float64 algorithm",
+    "fixed": "the bit-accurate model",
+    "rtl": "the Verilog, verilated, in the compiled loop",
+    "cocotb": "the Verilog under cocotb",
+}
+"""What runs on each backend."""
+
+
+def _moves(setting: Setting) -> list[str]:
+    """Return the area of every estimator over the reference's, with its interval; bold if the edge moves."""
+    cells = []
+    for move in setting["moves"].values():
+        area, low, high = (
+            None if each is None else f"{each:.2f}"
+            for each in (move["area_ratio"], move["area_ratio_low"], move["area_ratio_high"])
+        )
+        text = f"**{area}**" if move["moved"] else area
+        spread = "" if low == high else f" ({low} to {high or 'more'})"
+        cells.append(f"{text}{'+' * move['clipped']}{spread}")
+    return cells
+
+
+def _table(report: Report, chosen: list[Setting]) -> list[str]:
+    reference = report["settings"][0]["hit_s"]
+    rows = [
+        [
+            each["label"],
+            f"{each['hit_s'] * 1e3:.3g}",
+            number(reference / each["hit_s"], 2),
+            *_moves(each),
+        ]
+        for each in chosen
+    ]
+    names = [methods()[label].label for label in report["settings"][0]["moves"]]
+    return table(["setting", "a hit (ms)", "times as fast", *names], rows)
+
+
+def _single(report: Report, axes: tuple[str, ...]) -> list[Setting]:
+    """Return the settings of some axes, without those that are two at once."""
+    return [each for each in report["settings"][1:] if each["axis"] in axes]
+
+
+def parts(report: Report) -> list[str]:
+    """Return what parts do to the edge, those that a scene has and those that it lacks; the largest area first."""
+    found = _single(report, ("parts", "lacked"))
+    ordered = sorted(found, key=lambda each: -sum(move["area_ratio"] for move in each["moves"].values()))
+    return _table(report, ordered)
+
+
+def shortcuts(report: Report) -> list[str]:
+    """Return what settings of the simulation save, and what they do to the edge."""
+    return _table(report, _single(report, ("backend", "rate", "step", "K step")))
+
+
+def speed(report: Report) -> list[str]:
+    """Return the samples a second of every backend."""
+    heads = ["backend", "samples a second", "what runs"]
+    rows = ([f"`{name}`", f"{_big(rate)}", BACKENDS.get(name, "")] for name, rate in report["samples_per_s"].items())
+    return table(heads, rows, 1)
+
+
+def _big(rate: float) -> str:
+    """Return a rate with three digits, in thousands or millions."""
+    return f"{rate / 1e6:.3g} M" if rate >= 1e6 else f"{rate / 1e3:.3g} k"
+
+
+def waiting(report: Report) -> list[str]:
+    """Return how long whole commands take at the prompt."""
+    return table(["command", "s"], ([each["name"], number(each["here"])] for each in report["from_the_prompt"]))
+
+
+def costs_of_parts(report: Report) -> list[str]:
+    """Return the time of a sample of the model with parts of a device."""
+    return table(
+        ["part", "a sample (ns)"], ([name, number(ns)] for name, ns in report["ns_per_sample_of_parts"].items())
+    )
