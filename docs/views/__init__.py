@@ -24,7 +24,6 @@ VIEWS: dict[str, Callable[..., list[str]]] = {
     "frictions": walls.frictions,
     "hands": walls.hands,
     "cutoffs": walls.cutoffs,
-    "gains": walls.gains,
     "cures": walls.cures,
     "stiffest": walls.stiffest,
     "same-verdicts": walls.same_verdicts,

@@ -1,5 +1,6 @@
 """Tables of `hardwall trade` and `hardwall bench`."""
 
+import math
 from typing import Any
 
 from hardwall.sim.walls.methods import methods
@@ -7,6 +8,8 @@ from hardwall.sim.walls.methods import methods
 from .tables import Report, number, table
 
 Setting = dict[str, Any]
+ROWS = 8
+"""The largest number of parts in a table: those that move the edge most."""
 BACKENDS = {
     "float": "the float64 algorithm",
     "fixed": "the bit-accurate model",
@@ -30,36 +33,37 @@ def _moves(setting: Setting) -> list[str]:
     return cells
 
 
-def _table(report: Report, chosen: list[Setting]) -> list[str]:
-    reference = report["settings"][0]["hit_s"]
-    rows = [
-        [
-            each["label"],
-            f"{each['hit_s'] * 1e3:.3g}",
-            number(reference / each["hit_s"], 2),
-            *_moves(each),
-        ]
-        for each in chosen
-    ]
-    names = [methods()[label].label for label in report["settings"][0]["moves"]]
-    return table(["setting", "a hit (ms)", "times as fast", *names], rows)
+def _names(report: Report) -> list[str]:
+    """Return what a table calls the estimators of a trade."""
+    return [methods()[label].label for label in report["settings"][0]["moves"]]
 
 
-def _single(report: Report, axes: tuple[str, ...]) -> list[Setting]:
-    """Return the settings of some axes, without those that are two at once."""
+def _of(report: Report, *axes: str) -> list[Setting]:
+    """Return the settings of an axis or of several, without those that are two at once."""
     return [each for each in report["settings"][1:] if each["axis"] in axes]
+
+
+def _farthest(setting: Setting) -> float:
+    """Return by how much a setting moves the edge of some estimator, as a logarithm."""
+    return max(abs(math.log(move["area_ratio"])) for move in setting["moves"].values())
 
 
 def parts(report: Report) -> list[str]:
     """Return what parts do to the edge, those that a scene has and those that it lacks; the largest area first."""
-    found = _single(report, ("parts", "lacked"))
-    ordered = sorted(found, key=lambda each: -sum(move["area_ratio"] for move in each["moves"].values()))
-    return _table(report, ordered)
+    chosen = sorted(_of(report, "parts", "lacked"), key=_farthest)[-ROWS:]
+    chosen.sort(key=lambda each: -sum(move["area_ratio"] for move in each["moves"].values()))
+    return table(["area, of that with all parts", *_names(report)], ([each["label"], *_moves(each)] for each in chosen))
 
 
 def shortcuts(report: Report) -> list[str]:
-    """Return what settings of the simulation save, and what they do to the edge."""
-    return _table(report, _single(report, ("backend", "rate", "step", "K step")))
+    """Return what settings of the simulation save, the boldest two of a kind, and what they do to the edge."""
+    reference = report["settings"][0]["hit_s"]
+    chosen = [each for axis in ("backend", "rate", "step", "K step") for each in _of(report, axis)[:2]]
+    rows = (
+        [each["label"], f"{each['hit_s'] * 1e3:.3g}", number(reference / each["hit_s"], 2), *_moves(each)]
+        for each in chosen
+    )
+    return table(["setting", "a hit (ms)", "times as fast", *_names(report)], rows)
 
 
 def speed(report: Report) -> list[str]:
