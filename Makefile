@@ -142,7 +142,7 @@ docs: $(VENV)/.docs | tools ## the pages as a site in build/docs, every link ins
 diagrams: $(VENV)/.docs | tools ## draw the diagrams of the pages anew, from the code that they show
 	@$(RUN) docs.diagrams.draw
 
-results: $(VENV)/.docs | tools ## the reports of pages and README whose sources have changed, or ONLY="NAMES" (half an hour)
+results: $(VENV)/.docs | tools ## the reports of pages and README whose sources have changed, or ONLY="NAMES" (two hours)
 	@PYTHONPATH=tests $(VENV)/bin/python docs/reports.py $(if $(LIST),--list) $(ONLY)
 	@PYTHONPATH=tests $(VENV)/bin/python docs/for_readme.py
 

@@ -87,7 +87,7 @@ def _message(rows: list[Point]) -> str:
     if not areas:
         return "No setting moves the edge of the stable walls"
     (most, gain), (least, loss) = max(areas), min(areas)
-    return f"Most walls are stable {gain} ({most:.2g} times the area); fewest: {loss} ({least:.2g} times)"
+    return f"Most walls are stable {gain} ({most:.2g} times the area);\nfewest: {loss} ({least:.2g} times)"
 
 
 def _draw(axes: Axes, moves: list, shift: float, style: dict) -> None:
