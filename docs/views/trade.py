@@ -10,6 +10,8 @@ from .tables import Report, number, table
 Setting = dict[str, Any]
 ROWS = 8
 """The largest number of parts in a table: those that move the edge most."""
+SECONDS = " (s)"
+"""The unit of a command's time, in its name."""
 BACKENDS = {
     "float": "the float64 algorithm",
     "fixed": "the bit-accurate model",
@@ -80,11 +82,12 @@ def _big(rate: float) -> str:
 
 def waiting(report: Report) -> list[str]:
     """Return how long whole commands take at the prompt."""
-    return table(["command", "s"], ([each["name"], number(each["here"])] for each in report["from_the_prompt"]))
+    timed = [each for each in report["from_the_prompt"] if each["name"].endswith(SECONDS)]
+    return table(["command", "s"], ([each["name"].removesuffix(SECONDS), number(each["here"])] for each in timed))
 
 
 def costs_of_parts(report: Report) -> list[str]:
-    """Return the time of a sample of the model with parts of a device."""
-    return table(
-        ["part", "a sample (ns)"], ([name, number(ns)] for name, ns in report["ns_per_sample_of_parts"].items())
-    )
+    """Return the time of a sample of the model with the parts of a device that slow it most, and without any."""
+    parts = report["ns_per_sample_of_parts"]
+    slowest = sorted((name for name in parts if name != "none"), key=parts.__getitem__)[-ROWS + 1 :]
+    return table(["part", "a sample (ns)"], ([name, number(parts[name])] for name in ("none", *slowest)))
