@@ -13,9 +13,7 @@ ONE = "kalman"
 
 def _rate(row: Row) -> str:
     """Return what a table calls the rates of a row."""
-    if not row["own_rates"]:
-        return rate_text(row["actuation_hz"])
-    return f"own, {rate_text(row['sample_hz'])} and {rate_text(row['actuation_hz'])}"
+    return "own" if row["own_rates"] else rate_text(row["actuation_hz"])
 
 
 def _by_rate(report: Report) -> list[Row]:
@@ -58,7 +56,7 @@ def bandwidth(report: Report) -> list[str]:
     def cell(row: Row) -> str:
         return " / ".join(str(row[f"{part}_rendered_to_hz"] or "-") for part in ("stiffness", "damping"))
 
-    heads = ["K / B to (Hz), by rates", *(rate.split(",")[0] for rate in rates)]
+    heads = ["K / B to (Hz), by rates", *rates]
     return table(heads, ([name, *(cell(found[name, rate]) for rate in rates)] for name in names))
 
 
@@ -92,7 +90,7 @@ def contact(report: Report) -> list[str]:
     middle = len(speeds) // 2
     heads = [
         "rates",
-        *(f"rate-hardness at {number(speed * 1e3)} mm/s (kN/m)" for speed in speeds),
+        *(f"hardness at {number(speed * 1e3)} mm/s (kN/m)" for speed in speeds),
         f"first force at {number(speeds[middle] * 1e3)} mm/s (N)",
         "after (ms)",
     ]
@@ -100,7 +98,7 @@ def contact(report: Report) -> list[str]:
         heads,
         (
             [
-                _rate(row).split(",")[0],
+                _rate(row),
                 *(spread(each, "rate_hardness_n_per_m", 1e3) for each in row["contact"]),
                 spread(row["contact"][middle], "first_n"),
                 spread(row["contact"][middle], "first_s", 1e-3),
