@@ -16,6 +16,7 @@ from .groups import Named, Supervisor, Wall
 from .heartbeat import LEASE_S, Beat, Heartbeat
 from .homing import Homed, homing
 from .port import Port
+from .requests import Sending
 from .shared import Shared
 from .status import State, Status, Trip, status_of
 from .words import Words
@@ -140,8 +141,8 @@ class Axis(Named):
         """
         checks = {"arm": self._check_wanted, "disarm": None}
         check = checks.get(name, self._check_time)
-        place, at_once = self.device.registers[name].address, name == "disarm"
-        self._port.write(place, (1,), once=name not in TWICE, check=check, at_once=at_once)
+        sending = Sending(once=name not in TWICE, check=check, at_once=name == "disarm")
+        self._port.write(self.device.registers[name].address, (1,), sending)
 
     @contextmanager
     def by(self, until_s: float) -> Iterator[None]:
@@ -337,7 +338,7 @@ class Axis(Named):
             trip = self.trip
         if trip:
             word = self.device.registers["acknowledged"]
-            self._port.write(word.address, word.to_registers(trip.latched), check=self._check_time)
+            self._port.write(word.address, word.to_registers(trip.latched), Sending(check=self._check_time))
             # What the encoder says is a cause until the flags are cleared, so that comes first.
             self.pulse("clear_flags")
             self.pulse("acknowledge")
@@ -419,5 +420,5 @@ class Axis(Named):
             if self.lease is not None:
                 # The beat that the board has already is none, but it needs the lease.
                 word = self.device.registers["heartbeat"]
-                self._port.write(word.address, word.to_registers(self.read(word.name)), once=True)
+                self._port.write(word.address, word.to_registers(self.read(word.name)), Sending(once=True))
             self.disarm()

@@ -1,6 +1,7 @@
 """Several axes on one board: a port to the bank of each, and all of them behind the one line."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
 
 from ..model.axes.registers import BANK, is_shared
 from ..model.axis.registers import COUNTERS, END, PULSES, TELEMETRY
@@ -8,6 +9,7 @@ from .axis import Axis
 from .device import Device
 from .heartbeat import Beat
 from .port import Port
+from .requests import PLAIN, Sending
 from .shared import Shared
 
 
@@ -42,6 +44,18 @@ class BankPort(Port):
         """That of the line."""
         return self._line.lease
 
+    def line_s(self, count: int) -> float:
+        """Return the time that a read of so many registers takes of the line, s."""
+        return self._line.line_s(count)
+
+    def first(self) -> AbstractContextManager[None]:
+        """Let the requests of this thread go before those of others."""
+        return self._line.first()
+
+    def relay(self, request: bytes) -> bytes:
+        """Return the answer to another program's request, whose addresses are those of the line."""
+        return self._line.relay(request)
+
     def read(self, address: int, count: int) -> tuple[int, ...]:
         """Return successive registers; what there is once takes another request. Errors are those of `Port.read`."""
         places = range(address, address + count)
@@ -55,16 +69,9 @@ class BankPort(Port):
             registers |= {place: word for place, word in found if place in self._once}
         return tuple(registers[place] for place in places)
 
-    def write(
-        self,
-        address: int,
-        registers: tuple[int, ...],
-        once: bool = False,
-        check: Callable[[], None] | None = None,
-        at_once: bool = False,
-    ) -> None:
+    def write(self, address: int, registers: tuple[int, ...], sending: Sending = PLAIN) -> None:
         """Write successive registers, all in one request; the arguments and the errors are those of `Port.write`."""
-        self._line.write(address + (0 if address in self._once else self._base), registers, once, check, at_once)
+        self._line.write(address + (0 if address in self._once else self._base), registers, sending)
 
     def identify(self) -> dict[int, bytes]:
         """Return the objects by which the device identifies itself."""

@@ -8,6 +8,7 @@ from contextlib import suppress
 from ..model.register import Register
 from .errors import ChangedError, HostError, SilentError
 from .port import Port
+from .requests import Sending
 
 LEASE_S = 0.5
 """How long the heartbeat goes on after the application has renewed its lease."""
@@ -55,7 +56,8 @@ class Beat:
                 following = last % self._register.high + 1
                 self._numbers = last, following
                 with suppress(*([SilentError] if tries_left else [])):
-                    self._port.write(self._register.address, self._register.to_registers(following), once=True)
+                    registers = self._register.to_registers(following)
+                    self._port.write(self._register.address, registers, Sending(once=True))
                     self._numbers = (following,)
                     return
 

@@ -17,7 +17,7 @@ from .clients import client_of, reason
 from .errors import ChangedError, ForeignError, HeldError, PortError, RefusedError, SilentError
 from .leases import HELD, LEASE_OBJECT, NO_ANSWER, STALE
 from .precedence import Precedence
-from .requests import Request
+from .requests import PLAIN, Request, Sending
 
 BAUD, BAUD_MAX = 921_600, 4_000_000
 """The board's rate unless its clock is slow, and the highest of a serial port."""
@@ -141,23 +141,13 @@ class Port:
         """
         return self._precedence.taken()
 
-    def write(
-        self,
-        address: int,
-        registers: tuple[int, ...],
-        once: bool = False,
-        check: Callable[[], None] | None = None,
-        at_once: bool = False,
-    ) -> None:
+    def write(self, address: int, registers: tuple[int, ...], sending: Sending = PLAIN) -> None:
         """Write successive registers, all in one request.
 
         Args:
             address: that of the first.
             registers: their words.
-            once: whether it makes a difference that they are written twice. Without an answer they are then not
-                written again.
-            check: called in the turn of the request; what it raises is raised, and nothing is written.
-            at_once: whether it does not wait for a beat either.
+            sending: how the request goes out.
 
         Raises:
             ValueError: if they are more than a request takes.
@@ -165,7 +155,7 @@ class Port:
         """
         if not 1 <= len(registers) <= WRITE_MAX:
             raise ValueError(f"registers must be 1 to {WRITE_MAX}, not {len(registers)}")
-        self._ask(Request.writing(address, registers), once, check, at_once)
+        self._ask(Request.writing(address, registers), sending)
 
     def identify(self) -> dict[int, bytes]:
         """Return the objects by which the device identifies itself: 0 its vendor, 1 its product, 2 its revision."""
@@ -177,7 +167,7 @@ class Port:
         Raises:
             HostError: if the board does not answer.
         """
-        return self._ask(Request.relaying(request), once=True).frame
+        return self._ask(Request.relaying(request), Sending(once=True)).frame
 
     @property
     def lease(self) -> str | None:
@@ -190,18 +180,16 @@ class Port:
             return None
         return self._ask(Request.lease()).information[LEASE_OBJECT].decode("utf-8", "replace")
 
-    def _ask(
-        self, request: Request, once: bool = False, check: Callable[[], None] | None = None, at_once: bool = False
-    ) -> Any:
+    def _ask(self, request: Request, sending: Sending = PLAIN) -> Any:
         """Return the answer to a request, which is asked again without one, in a turn of its own each time."""
         until_s, silent = time.monotonic() + self._answer_s, None
         while True:
             if self._gone:
                 raise PortError(f"{self.name} is closed or gone: connect again")
-            if not at_once:
+            if not sending.at_once:
                 self._precedence.wait(BEAT_S / self.pace)
             try:
-                turn = self._turns.submit(self._turn, request, check)
+                turn = self._turns.submit(self._turn, request, sending.check)
             except RuntimeError:
                 # Another thread has closed it just now, or the program ends.
                 raise PortError(f"{self.name} is closed: connect again") from None
@@ -209,7 +197,7 @@ class Port:
                 return turn.result()
             except SilentError as error:
                 silent = silent or error
-                if once or time.monotonic() >= until_s:
+                if sending.once or time.monotonic() >= until_s:
                     raise silent from None
 
     def _turn(self, request: Request, check: Callable[[], None] | None) -> ModbusPDU:

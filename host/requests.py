@@ -14,6 +14,24 @@ WRITTEN_SIZE = 8
 """The bytes of the answers to a write and to a diagnosis."""
 
 
+class Sending(NamedTuple):
+    """How a request goes out.
+
+    Attributes:
+        once: whether it makes a difference that it is done twice. Without an answer it is then not asked again.
+        check: called in the turn of the request; what it raises is raised, and nothing is sent. None: no check.
+        at_once: whether it does not wait for a beat either.
+    """
+
+    once: bool = False
+    check: Callable[[], None] | None = None
+    at_once: bool = False
+
+
+PLAIN = Sending()
+"""How a request goes out that may be done twice, needs no check and waits for its turn."""
+
+
 class Relayed(NamedTuple):
     """An answer as it came, which may be an exception: unit, function and data."""
 

@@ -12,6 +12,7 @@ from .bounds import word_of
 from .device import Device
 from .errors import ChangedError, HeldError, RefusedError
 from .port import Port
+from .requests import Sending
 
 OF_THE_HEARTBEAT = ("heartbeat", "acknowledged")
 """Live words that are no settings."""
@@ -140,7 +141,7 @@ class Words:
         """Write registers by which some words are given."""
         self._tried = given
         try:
-            self._port.write(address, registers, check=self._check)
+            self._port.write(address, registers, Sending(check=self._check))
         except (RefusedError, HeldError, ChangedError):
             self._tried = {}
             raise

@@ -15,7 +15,7 @@ import uvicorn
 from fastapi import FastAPI, WebSocket
 from fastapi.responses import PlainTextResponse, Response
 from fastapi.staticfiles import StaticFiles
-from nicegui import ui
+from nicegui import app, ui
 
 from .driver import Driver
 from .live import Bench, Live
@@ -251,6 +251,9 @@ def _application(driver: Driver, bench: Bench | None, title: str, token: Token) 
 
     application.mount(f"{first}/static", FreshFiles(directory=STATIC))
     add_page(driver, bench, title, token.about)
+    # The framework shows a bar, which has no name, while the page asks for something. All comes from this machine: the
+    # bar would tell nobody anything.
+    app.config.quasar_config["loadingBar"]["skipHijack"] = True
     # Everything comes from this server: no other one is asked, so that the page works without a network.
     # Whether it is light or dark is the browser's to say.
     ui.run_with(application, mount_path=first, title=title, dark=None, tailwind=False, show_welcome_message=False)

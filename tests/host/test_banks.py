@@ -18,7 +18,10 @@ from hardwall.host import (
     connect_axes,
     share,
 )
+from hardwall.host.banks import BankPort
 from hardwall.host.device import AXES_AT
+from hardwall.host.port import Port
+from hardwall.host.requests import PLAIN, Sending
 from hardwall.model.axes import register_file as banked_file
 from hardwall.model.axes.axis import AxesSpec
 from hardwall.model.axes.registers import BANK, AxesMap
@@ -89,6 +92,29 @@ def axes(board) -> Iterator[Axes]:
 
 def states(axes: Axes) -> list[State]:
     return [axis.status.state for axis in axes]
+
+
+def test_the_port_of_a_bank_does_all_that_a_line_does(board, axes):
+    public = {name for name in vars(Port) if not name.startswith("_")}
+    assert public <= set(vars(BankPort))
+    assert axes[2].line_s(10) == axes[0].line_s(10) > 0
+    assert axes[2].read_registers(0, 2) == axes[0].read_registers(0, 2)
+
+
+def test_what_an_axis_sends_goes_out_as_it_says(axes, monkeypatch):
+    """A pulse that counts twice is not sent twice, and a disarm does not wait for a beat."""
+    sent, write = [], Port.write
+
+    def seen(self: Port, address: int, registers: tuple[int, ...], sending: Sending = PLAIN) -> None:
+        sent.append((address - BANK, sending.once, sending.at_once, sending.check is not None))
+        write(self, address, registers, sending)
+
+    monkeypatch.setattr(Port, "write", seen)
+    for name in ("disarm", "clear_flags"):
+        axes[1].pulse(name)
+    registers = axes.device.registers
+    disarm, clear = registers["disarm"].address, registers["clear_flags"].address
+    assert sent == [(disarm, False, True, False), (clear, True, False, True)]
 
 
 def test_words_reach_one_axis_alone(board, axes):

@@ -14,6 +14,7 @@ import pytest
 
 from hardwall.host.errors import ForeignError, PortError, RefusedError, SilentError
 from hardwall.host.port import BAUD, BRIDGE_S, DEVICE_BITS, MACHINE_S, Port
+from hardwall.host.requests import Sending
 from hardwall.model.checks import FieldError
 from hardwall.model.link.board_pace import Teller
 from hardwall.model.link.server import WRITE_MAX
@@ -90,7 +91,7 @@ def test_what_may_not_is_an_error_once(board, port, fault):
     setattr(board, fault, 1)
     before = len(board.requests)
     with pytest.raises(SilentError, match="which may have been carried out"):
-        port.write(STIFFNESS, (0, 78), once=True)
+        port.write(STIFFNESS, (0, 78), Sending(once=True))
     assert len(board.requests) == before + 1
     assert port.read(STIFFNESS, 2) == (0, 78)
 
@@ -113,7 +114,7 @@ def test_a_board_that_is_slower_is_waited_for_longer(board, pace, waits):
     port.read(0, 2)
     board.late_s = 0.25
     with nullcontext() if waits else pytest.raises(SilentError):
-        port.write(STIFFNESS, (0, 5), once=True)
+        port.write(STIFFNESS, (0, 5), Sending(once=True))
     port.close()
 
 
@@ -133,7 +134,7 @@ def test_a_board_that_becomes_slower_is_waited_for_longer(board, told, waits):
         if told is not None:
             teller.tell(told)
         with nullcontext() if waits else pytest.raises(SilentError):
-            port.write(STIFFNESS, (0, 5), once=True)
+            port.write(STIFFNESS, (0, 5), Sending(once=True))
         port.close()
 
 
@@ -143,7 +144,7 @@ def test_what_is_called_off_in_its_turn_is_not_written(board, port):
 
     before = len(board.requests)
     with pytest.raises(ZeroDivisionError):
-        port.write(STIFFNESS, (0, 5), check=call_off)
+        port.write(STIFFNESS, (0, 5), Sending(check=call_off))
     assert not any(request[1] == 16 for request in board.requests[before:])
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from hardwall.host.port import Port
 from hardwall.host.precedence import Precedence
+from hardwall.host.requests import Sending
 from host.twin_board import PATIENT
 
 LONG_S, SHORT_S = 600.0, 0.05
@@ -50,6 +51,6 @@ def test_what_is_asked_waits_for_a_beat_and_what_is_written_at_once_does_not(boa
             expected = port.read(4, 2)
             asked = others.submit(read)
             began.wait()
-            others.submit(port.write, disarm, (1,), at_once=True).result()
+            others.submit(port.write, disarm, (1,), Sending(at_once=True)).result()
             assert not asked.done()
         assert asked.result() == expected

@@ -276,6 +276,17 @@ def test_a_page_has_names_contrast_and_landmarks(panel, chromium, tab, size, sch
     assert found == []
 
 
+def test_what_the_page_asks_for_shows_no_bar_without_a_name(tab):
+    ask = """new Promise((done) => {
+      const request = new XMLHttpRequest();
+      request.onloadend = () => requestAnimationFrame(() => requestAnimationFrame(done));
+      request.open("GET", "static/panel.css");
+      request.send();
+    }).then(() => true)"""
+    assert tab.page.evaluate(ask)
+    assert tab.page.get_by_role("progressbar").count() == 0
+
+
 def test_controls_are_called_by_what_they_set_and_drawings_by_what_they_show(tab):
     for name in ("Stiffness K, N/m", "Damping B, N s/m", "Wall begins at, mm", "Force limit, N"):
         for role in ("slider", "spinbutton"):
