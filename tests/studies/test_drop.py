@@ -98,7 +98,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     assert kalman["before_the_end"] == 1.0
     wanted = {
         "rest": ("damping B of the wall (N s/m)", "shaken, by more than 3 µm"),
-        "law": ("measured = predicted", "changed: friction, push"),
+        "law": ("predicted: the handle rests up to B (N s/m)", "measured in the loop: B (N s/m)"),
         "ends": ("stiffness K of the wall (kN/m)", "stable up to here"),
         "maps": ("stiffness K (kN/m)", "Kalman ("),
     }
