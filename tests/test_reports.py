@@ -131,6 +131,90 @@ def test_every_table_of_a_page_is_whole_and_narrow():
         assert rows[0].count("|") <= 10, view
 
 
+def cells(names: list[str], view: str) -> dict[str, list[str]]:
+    """Return the cells of a view's table by the first of their row, without what marks them."""
+    rows = [line.strip("| ").split(" | ") for line in views.shown(names, view) if line.startswith("|")][2:]
+    return {row[0].strip("`"): [re.sub(r"[*+`]| \(.*| %$", "", cell) for cell in row[1:]] for row in rows}
+
+
+def close(text: str, value: float) -> bool:
+    """Return whether a number of two digits or more is the one that is expected."""
+    return float(text) == pytest.approx(value, rel=5e-2, abs=5e-3)
+
+
+def test_tables_of_walls_have_the_numbers_of_their_reports():
+    found = {each["label"]: each for each in KEPT["estimators-map"].report["maps"]}
+    table = cells(["estimators-map"], "regions")
+    assert [*table] == sorted(found, key=lambda label: -found[label]["area_n2_s_per_m2"])
+    for label, (area, share, stiffest, end) in table.items():
+        of = found[label]
+        assert close(area, of["area_n2_s_per_m2"] / 1000)
+        assert close(share, 100 * of["area_held_n2_s_per_m2"] / of["area_n2_s_per_m2"])
+        assert close(stiffest, of["largest_stiffness_n_per_m"] / 1000)
+        assert close(end, max(damping for damping, stiffness, *_ in of["boundary"] if stiffness))
+    names = ["cutoff", "cutoff-without-friction"]
+    for name, row in zip(names, cells(names, "cutoffs").values(), strict=True):
+        (device,) = KEPT[name].report["devices"]
+        assert int(row[0]) == round(device["best_cutoff_hz"])
+        best = max(each["area_n2_s_per_m2"] for each in device["maps"])
+        assert close(row[2], best / 1000)
+        assert close(row[3], device["unfiltered"]["area_n2_s_per_m2"] / 1000)
+    for fact, row in zip(KEPT["figure-5"].report["facts"], cells(["figure-5", "fit"], "facts").values(), strict=True):
+        assert close(row[0], 100 * fact["share"])
+
+
+def test_equal_verdicts_are_counted_wall_by_wall(monkeypatch):
+    """Also if some are not equal: then one wall less."""
+    names = ["map-rtl", "map-fixed"]
+    table = cells(names, "same-verdicts")
+    assert all(walls == equal and int(walls) > 10 for *_, walls, equal in table.values())
+    changed = json.loads(json.dumps(KEPT["map-rtl"].report))
+    changed["maps"][0]["p_stable"][0][2] -= 1
+    monkeypatch.setattr(
+        views, "_kept", lambda name: replace(KEPT[name], report=changed) if name == "map-rtl" else KEPT[name]
+    )
+    (*_, walls, equal), *others = cells(names, "same-verdicts").values()
+    assert int(equal) == int(walls) - 1
+    assert all(row[-2] == row[-1] for row in others)
+
+
+def test_tables_of_hardware_have_the_numbers_of_their_reports():
+    table = cells(["costs"], "costs")
+    for row in KEPT["costs"].report["rows"]:
+        own = table[row["estimator"]]
+        assert own[:3] == [str(row[key]) for key in ("latency_clocks", "lut4", "dsp")]
+        assert row["board"] is None or close(own[-1], row["board"]["max_sample_hz"] / 1e6)
+    for each in (KEPT[name].report for name in ("synth-ecp5", "synth-ice40", "synth-gowin")):
+        row = cells(["synth-ecp5", "synth-ice40", "synth-gowin"], "placed")[each["device"]]
+        assert row[0] == f"{each['lut4']} of {each['available']['lut4']}"
+        assert close(row[-2], each["pin_to_force_ns"])
+        assert close(row[-1], each["max_sample_hz"] / 1e6)
+    for row in KEPT["axes"].report["rows"]:
+        own = cells(["axes"], "axes")[str(row["axes"])]
+        assert close(own[3], row["fmax_mhz"])
+        assert close(own[6], row["axes"] * row["max_sample_hz"] / 1e6)
+    rows = {(f"{row['estimator']}` {row['output']}", row["bits_dropped"]): row for row in KEPT["bits"].report["rows"]}
+    for name, own in cells(["bits"], "bits").items():
+        whole, less = rows[name, 0], rows[name, 6]
+        assert close(own[2], less["rms_mm_s"] / whole["rms_mm_s"])
+        assert int(own[-1]) == round(100 - 100 * less["lut4"] / whole["lut4"])
+
+
+def test_tables_of_time_have_the_numbers_of_their_reports():
+    bench, trade = KEPT["bench"].report, KEPT["trade-direct"].report
+    for name, (rate, _) in cells(["bench"], "speed").items():
+        number_of, unit = rate.split()
+        assert close(number_of, bench["samples_per_s"][name] / {"M": 1e6, "k": 1e3}[unit])
+    for part, (time,) in cells(["bench"], "costs-of-parts").items():
+        assert close(time, bench["ns_per_sample_of_parts"][part])
+    settings = {each["label"]: each for each in trade["settings"]}
+    for label, (hit, times, *areas) in cells(["trade-direct"], "shortcuts").items():
+        assert close(hit, 1000 * settings[label]["hit_s"])
+        assert close(times, trade["settings"][0]["hit_s"] / settings[label]["hit_s"])
+        moves = settings[label]["moves"].values()
+        assert all(close(area, move["area_ratio"]) for area, move in zip(areas, moves, strict=True))
+
+
 def test_a_report_that_is_not_known_is_not_shown(monkeypatch):
     for name, view, said in (
         ("none", "situations", "no such report"),

@@ -24,18 +24,19 @@ def spread(row: dict[str, Any], key: str, unit: float = 1.0) -> str:
     """Return the median of starts in a unit, and in brackets its range if that is seen; `none` where there is none."""
     if row[key] is None:
         return "none"
-    median, low, high = (number(row[f"{key}{end}"] / unit) for end in ("", "_low", "_high"))
-    return median if low == high else f"{median} ({low} to {high})"
+    return _ranged(*(number(row[f"{key}{end}"] / unit) for end in ("", "_low", "_high")))
 
 
 def of_starts(values: Sequence[float], digits: int = 3) -> str:
     """Return the median of values, and in brackets their range if that is seen."""
-    middle, low, high = (number(value, digits) for value in (median(values), min(values), max(values)))
-    return middle if low == high else f"{middle} ({low} to {high})"
+    return _ranged(*(number(value, digits) for value in (median(values), min(values), max(values))))
 
 
 def of_draws(value: float, low: float, high: float, unit: float = 1.0, *, whole: bool = False) -> str:
     """Return a value in a unit, and in brackets its interval if that is seen; without decimals if it is to be whole."""
-    texts = (f"{each / unit:.0f}" if whole else number(each / unit) for each in (value, low, high))
-    middle, low_text, high_text = texts
-    return middle if low_text == high_text else f"{middle} ({low_text} to {high_text})"
+    return _ranged(*(f"{each / unit:.0f}" if whole else number(each / unit) for each in (value, low, high)))
+
+
+def _ranged(middle: str, low: str, high: str) -> str:
+    """Return a number, and in brackets its range if that is seen."""
+    return middle if low == high else f"{middle} ({low} to {high})"
