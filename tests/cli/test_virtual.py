@@ -69,7 +69,10 @@ def test_the_serial_port_is_one_for_any_program():
 
 @pytest.mark.parametrize("by", ["tcp", "terminal"])
 def test_a_flood_of_random_bytes_silences_no_port(by):
-    """2.9 MB, which the line would take half a minute of the board's time for, and none of which is a request."""
+    """2.9 MB, which the line would take half a minute of the board's time for, and none of which is a request.
+
+    The host's five tries of a second are of the board's time, too: it would give up long before the line is through.
+    """
     with running(CLOCK, "--tcp", "0", "--speed", "0") as board:
         junk, port = random.Random(1).randbytes(2_900_000), os.open(board.path, os.O_RDWR | os.O_NOCTTY)
         if by == "tcp":
@@ -82,11 +85,9 @@ def test_a_flood_of_random_bytes_silences_no_port(by):
             view = memoryview(junk)
             while view:
                 view = view[os.write(port, view) :]
-        began = time.monotonic()
-        with connect(board.path, answer_s=5.0) as axis:
+        with connect(board.path, answer_s=1.0) as axis:
             assert axis.device.identity == REGISTERS.identity
-        connect(board.tcp, answer_s=5.0).close()
-        assert time.monotonic() - began < 20
+        connect(board.tcp, answer_s=1.0).close()
         os.close(port)
 
 
