@@ -54,7 +54,7 @@ class Estimator(EstimatorBlock):
         m.d.sync += self.valid.eq(0)
         with m.FSM():
             # Since the last error, the tracked position has moved by u.
-            first = arrive(m, self, e, e + u, "PREPARE")
+            first = arrive(m, self, e, e + u, velocity.f, "PREPARE")
             with m.State("PREPARE"):
                 size, over = magnitude(e, error)
                 m.d.comb += [root.start.eq(1), root.radicand.eq(shift_floor(size, velocity.f - design.radicand.f))]
@@ -143,11 +143,11 @@ def distance_of(design):
     return Signal(signed(max(led, design.count_width + design.velocity.f) + 1))
 
 
-def arrive(m, block, distance, lead, then):
+def arrive(m, block, distance, lead, fraction, then):
     """Add the state of the strobe, with which the whole family begins: it takes the distance; state `then` follows.
 
     The distance is 0 at the first sample; the returned signal says, after the strobe, whether it is that one, and the
-    block starts from zero then. `lead` is the distance from the last count.
+    block starts from zero then. `lead` is the distance from the last count; both have `fraction` bits of a count.
     """
     running, first = Signal(), Signal()
     last, moved = Signal.like(block.seen.count), Signal.like(block.seen.count)
@@ -156,7 +156,7 @@ def arrive(m, block, distance, lead, then):
     m.d.comb += moved.eq(block.seen.count - last)
     with m.State("SAMPLE"), m.If(block.strobe):
         m.d.sync += [
-            distance.eq(Mux(fresh, 0, lead - (moved << block.design.velocity.f))),
+            distance.eq(Mux(fresh, 0, lead - (moved << fraction))),
             last.eq(block.seen.count),
             running.eq(1),
             first.eq(fresh),

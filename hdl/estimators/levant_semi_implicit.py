@@ -90,7 +90,7 @@ class Estimator(EstimatorBlock):
 
         m.d.sync += self.valid.eq(0)
         with m.FSM():
-            first = arrive(m, self, distance, lead, "MAGNITUDE")
+            first = arrive(m, self, distance, lead, velocity.f, "MAGNITUDE")
             after = self._adapt(m, first, negative, size)
             with m.State("MAGNITUDE"):
                 limited, over = magnitude(distance, error)

@@ -69,11 +69,15 @@ COLOURS = {
     "levant-semi-implicit": "#AA4499",
     "levant-implicit": "#882255",
     "levant-adaptive": "#332288",
+    "levant-2": "#E7298A",
+    "levant-3": "#7570B3",
+    "levant-2-filtering": "#66A61E",
+    "levant-3-filtering": "#1B9E77",
     "window": "#CC79A7",
     "foaw": "#3FA7D6",
     "least-squares": "#1F4E79",
 }
-MARKERS = dict(zip(COLOURS, "ovsDd<>12^8phXP*H", strict=True))
+MARKERS = dict(zip(COLOURS, "ovsDd<>12^8phX34|_P*H", strict=True))
 OTHER = {"color": "#000000", "marker": "."}
 """The style of an estimator that has no colour here yet."""
 FADED = 0.5

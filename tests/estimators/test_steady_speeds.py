@@ -22,6 +22,7 @@ from hardwall.model.encoder import quadrature
 from hardwall.model.encoder.quadrature import Seen
 from hardwall.model.estimators import registry
 from hardwall.model.estimators.estimate import EstimatorDesign
+from hardwall.model.estimators.levant_higher_design import LAMBDA
 from hardwall.model.runtime.compiled import compiled
 from hardwall.testing.estimators import run
 from oracles.steady import Steady, ladder, polynomial, stable
@@ -45,6 +46,7 @@ PLACES = 4
 MOST_SAMPLES = 30_000_000 if WHOLE else 300_000
 """The longest start that is run with gains at the ends of their ranges."""
 LEVANTS = ("levant", "levant-semi-implicit", "levant-implicit", "levant-adaptive")
+HIGHER = ("levant-2", "levant-3", "levant-2-filtering", "levant-3-filtering")
 CASES = [(axis, name, output) for axis in AXES for name, kind in registry.ESTIMATORS.items() for output in kind.outputs]
 every_case = pytest.mark.parametrize(("name", "estimator", "output"), CASES)
 
@@ -133,7 +135,7 @@ def _window(axis) -> float:
 
 def speeds(name: str, estimator: str) -> list[tuple[int, int]]:
     """Return the speeds of an axis."""
-    axis, ratio = spec(name, estimator), RATIOS[estimator in LEVANTS and name == SLOW_STARTS]
+    axis, ratio = spec(name, estimator), RATIOS[estimator in (*LEVANTS, *HIGHER) and name == SLOW_STARTS]
     least = SLOWEST * Fraction(axis.speed_max_counts_per_sample)
     return ladder(least, fastest(name, estimator), ratio, 4 if registry.design_of(estimator).uses_stamps() else 1)
 
@@ -147,8 +149,12 @@ def lengths(name: str, estimator: str, steady: Steady, words: dict[str, int], sl
     if estimator in LEVANTS:
         alpha = words[d.words[1].name] / 2**d.velocity.f
         start += slews * min(abs(steady.speed), Fraction(d.velocity.max, 2**d.velocity.f)) / alpha
-    if estimator in (*LEVANTS, "levant-edge"):
-        behind = period * math.ceil((40_000 if estimator in LEVANTS else 8_000) / period)
+    if estimator in HIGHER:
+        lipschitz = d.lipschitz * 2.0 ** words[d.words[0].name]
+        moved = min(abs(steady.speed), Fraction(d.velocity.max, 2**d.velocity.f))
+        start += slews * (float(moved) / lipschitz) ** (1 / d.order) + 60 * lipschitz ** (-1 / (d.order + 1))
+    if estimator in (*LEVANTS, *HIGHER, "levant-edge"):
+        behind = period * math.ceil((8_000 if estimator == "levant-edge" else 40_000) / period)
     return math.ceil(start / period) * period, behind
 
 
@@ -159,6 +165,7 @@ def bound(axis: Axis, words: dict[str, int], output: str, steady: Steady, sample
       linear filter with the designed gains, whose floors are less than half an LSB together.
     - A Levant's u moves its position, so that the mean is the way of that position. u1 differs from it by the mean of
       lambda sqrt(|e|), with |e| of a count at most, and by a step of alpha.
+    - The mean of z1 differs by the mean correction of z0, for an error of some counts, and by half of that of z1.
     - An estimator by stamps counts whole cycles of four edges, in a time that it knows to a clock. Those of every edge
       know the time of one, and `levant-edge` has a position, too.
     """
@@ -169,6 +176,10 @@ def bound(axis: Axis, words: dict[str, int], output: str, steady: Steady, sample
         if d.name not in ("levant-edge", "edge-kalman"):
             return speed / (4 * clocks - 1) + lsb
         return speed / clocks + lsb + (Fraction(2 * PLACES, samples) if d.name == "levant-edge" else 0)
+    if d.name in HIGHER:
+        own = (d.lipschitz * 2.0 ** words[d.words[0].name]) ** (1 / (d.order + 1))
+        first, second = (LAMBDA[d.degree - 1][n] * PLACES ** (n / d.degree) * own for n in (d.order, d.order - 1))
+        return Fraction(2 * PLACES, samples) + lsb + Fraction(first + second * own / 2)
     if d.name not in LEVANTS:
         return lsb
     lam, alpha, *_ = (words[word.name] / Fraction(2) ** word.format.f for word in d.words)
@@ -197,12 +208,12 @@ def test_an_estimate_never_falls_as_the_speed_grows(name, estimator, output):
                 # A speed that is flagged is followed by none that is not.
                 assert not flagged, float(steady.speed)
             means[way] = way * fixed.mean
-            # u1 has a ripple that may lock to that of the counts.
-            slack = within if output == "u1" and not fixed.flags else 0
+            # u1, as z1, has a ripple that may lock to that of the counts.
+            slack = within if output in ("u1", "z1") and not fixed.flags else 0
             assert means[way] >= last.get((way, False), Fraction(0)) - slack, float(steady.speed)
             last[way, False] = means[way]
             # The float kernel has no format, and is not followed to where a Levant's start is too long.
-            if not fixed.flags or estimator not in LEVANTS:
+            if not fixed.flags or estimator not in (*LEVANTS, *HIGHER):
                 real = settled(axes[1], seen, start)
                 assert abs(real.mean - steady.speed) <= bound(axes[1], words, output, steady, behind)
                 assert way * real.mean >= last.get((way, True), Fraction(0)) - slack, float(steady.speed)

@@ -1,0 +1,142 @@
+"""Levant's sliding-mode differentiators of order 2 and 3, with and without filtering."""
+
+from itertools import pairwise
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, signed
+
+from hardwall.model.estimators.levant_higher_design import Design
+
+from ..arithmetic.fixed import fits, fitted, shape, shift_round_half_up
+from ..arithmetic.powers import Powers
+from ..wires import port
+from .estimate import EstimatorBlock
+from .levant import arrive
+
+
+class Estimator(EstimatorBlock):
+    """A differentiator of one of the four designs, one sample at a time.
+
+    Equation, per sample, in counts and sample periods, with r = |e|^(1 / (N + 1)); without filtering e = z0 - count,
+    with it e = w, and the lines are those of `hardwall.model.estimators.levant_higher_design`:
+
+        w  <- w + (z0 - count)      - c_N     r^N     sign(e)
+        z0 <- z0 + z1 + z2 / 2      - c_(N-1) r^(N-1) sign(e)
+        z1 <- z1 + z2 + z3 / 2      - ...
+        z2 <- z2 + z3               - ...
+        z3 <- z3                    - c_0 sign(e)
+
+    Start: at the first sample, and with `restart`, z0 = count and all else is 0.
+
+    Latency: `latency` clocks from `strobe` to `valid`: one for the distance from the count, one for the magnitude of
+    e, those of the powers, one for the sums; the next `strobe` may come with `valid`.
+
+    Rounding and overflow: the powers are rough, as derived; Taylor's terms round half up; what saturates is flagged.
+    The count may wrap.
+
+    Parameters
+    ----------
+    design : hardwall.model.estimators.levant_higher_design.Design
+        Formats; its module derives them.
+
+    Source: Levant 2003; Livne, Levant 2014; Levant, Livne 2020.
+    """
+
+    design_class = Design
+
+    def elaborate(self, platform):
+        m = Module()
+        design = self.design
+        m.submodules.powers = powers = Powers(design.powers)
+        octaves = port(self, design.words[0].name)
+        m.d.comb += powers.octaves.eq(octaves)
+
+        # The states. z1 has half of the output's LSB added; z0 is held as its distance from the last count, `lead`.
+        w, half = Signal(shape(design.w)), design.half
+        z = [
+            Signal(shape(each), name=f"z{n}", init=half if n == 1 else 0)
+            for n, each in enumerate(design.z[: design.order], 1)
+        ]
+        lead = Signal(signed(max(design.gap.width, design.z[0].width, *map(len, self._terms(powers))) + 3))
+        led = Signal(signed(max(len(lead), design.count_width + design.gap.f) + 1))
+        gap, over, negative, still = Signal(shape(design.gap)), Signal(), Signal(), Signal()
+        states = [*([w] if design.filtering else []), lead, *z]
+        sums = self._taylor(m, states, gap)
+        corrections = [*self._terms(powers), Mux(still, 0, self._relay(m, octaves))]
+
+        m.d.comb += self.velocity.eq(z[0][-len(self.velocity) :])
+        m.d.sync += [self.valid.eq(0), powers.start.eq(0)]
+        with m.FSM():
+            first = arrive(m, self, led, lead, design.gap.f, "MAGNITUDE")
+            with m.State("MAGNITUDE"):
+                near = fitted(led, design.gap.width)
+                error = w if design.filtering else near
+                m.d.sync += [
+                    gap.eq(near),
+                    over.eq(~fits(led, design.gap.width)),
+                    powers.size.eq(error ^ error[-1].replicate(len(error))),
+                    negative.eq(error[-1]),
+                    still.eq(error == 0),
+                    powers.start.eq(1),
+                ]
+                m.next = "POWERS"
+            with m.State("POWERS"), m.If(powers.done):
+                far = [_moved(total, term, ~negative) for total, term in zip(sums, corrections, strict=True)]
+                beyond = [~fits(each, len(state)) for each, state in zip(far, states, strict=True)]
+                error_beyond, (_, velocity_beyond, *others) = beyond[: design.filtering], beyond[design.filtering :]
+                for number, (state, after) in enumerate(zip(states, far, strict=True)):
+                    # The lead saturates when it has become the distance from the next count.
+                    fresh = first | velocity_beyond if number > design.filtering + 1 else first
+                    m.d.sync += state.eq(Mux(fresh, state.init, after if state is lead else fitted(after, len(state))))
+                m.d.sync += [
+                    self.saturated[0].eq(~first & Cat(over, *error_beyond).any()),
+                    self.saturated[1].eq(~first & velocity_beyond),
+                    self.saturated[2].eq(~first & Cat(*others).any()),
+                    self.valid.eq(1),
+                ]
+                m.next = "SAMPLE"
+        return m
+
+    def _terms(self, powers: Powers) -> list[Signal]:
+        """Return the terms of all states but the last."""
+        return [port(powers, f"term_{number}") for number in range(self.design.degree - 1)]
+
+    def _taylor(self, m: Module, states: list[Signal], gap: Signal) -> list[Signal]:
+        """Return every state moved by those that follow it, in registers, which are ready while the powers are made.
+
+        The states stay until then: `onward`, to which z1 and z2 come first, is ready a clock after them.
+        """
+        design = self.design
+        w, lead, z = states[0], states[design.filtering], states[design.filtering + 1 :]
+        f = [design.gap.f, *(each.f for each in design.z)]
+        onward, ahead = Signal(signed(len(z[0]) + 1)), Signal.like(lead)
+        m.d.sync += [
+            onward.eq(z[0] - design.half + shift_round_half_up(z[1], f[2] - f[1] + 1)),
+            ahead.eq(gap + shift_round_half_up(onward, f[1] - f[0])),
+        ]
+        sums = [ahead]
+        if design.filtering:
+            sums.insert(0, Signal(signed(max(len(w), len(gap)) + 1), name="ahead_w"))
+            m.d.sync += sums[0].eq(w + shift_round_half_up(gap, design.gap.f - design.w.f))
+        for n, (state, following) in enumerate(pairwise(z), 1):
+            change = following
+            if n + 2 <= design.order:
+                change = following + shift_round_half_up(z[n + 1], f[n + 2] - f[n + 1] + 1)
+            sums.append(Signal(signed(max(len(state), len(change)) + 1), name=f"ahead_{n}"))
+            m.d.sync += sums[-1].eq(state + shift_round_half_up(change, f[n + 1] - f[n]))
+        return [*sums, z[-1]]
+
+    def _relay(self, m: Module, octaves: Signal) -> Signal:
+        """Return the correction of the last state, in a register."""
+        least, most = self.design.powers.octaves
+        relay = Signal((self.design.relays[most]).bit_length())
+        with m.Switch(octaves):
+            for k in range(least, most + 1):
+                with m.Case(k):
+                    m.d.sync += relay.eq(self.design.relays[k])
+        return relay
+
+
+def _moved(value, by, down):
+    """Return a signed value plus an unsigned one, or less it where `down` is high, in one chain of carries."""
+    by = Cat(by, Const(0, 1)) ^ down.replicate(len(by) + 1)
+    return (Cat(down, value).as_signed() + Cat(down, by).as_signed()) >> 1

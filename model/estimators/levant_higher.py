@@ -1,0 +1,111 @@
+"""The kernels of Levant's differentiators of order 2 and 3, in fixed point and in float64; their equations, formats and
+sources are in `levant_higher_design`, which also has the four designs.
+
+At the first sample everything is 0, so that there is no correction either: the state after it is that of rest.
+"""
+
+from ..arithmetic import powers
+from ..arithmetic.fixed import saturate, shift_round_half_up, wrap
+from ..runtime.compiled import compiled
+from .estimate import estimate
+from .levant import sign_of
+from .levant_higher_design import Design, FloatParams, JerkGains, Params, SnapGains, State
+
+
+class Order2(Design):
+    """Order 2, the equation of the paper of 2003."""
+
+    name = "levant-2"
+    gains_class = JerkGains
+    order = 2
+
+
+class Order3(Design):
+    """Order 3, the equation of the paper of 2003."""
+
+    name = "levant-3"
+    gains_class = SnapGains
+    order = 3
+
+
+class Filtering2(Design):
+    """Order 2 with filtering of order 1, the equation of the paper of 2020."""
+
+    name = "levant-2-filtering"
+    gains_class = JerkGains
+    order, filtering = 2, 1
+
+
+class Filtering3(Design):
+    """Order 3 with filtering of order 1, the equation of the paper of 2020."""
+
+    name = "levant-3-filtering"
+    gains_class = SnapGains
+    order, filtering = 3, 1
+
+
+@compiled
+def held(word, largest):
+    """Return a word held within two's complement, whose largest word is given."""
+    return saturate(word, -largest - 1, largest)
+
+
+@estimate.register(Params)
+@compiled
+def step(params, state, seen, restart):
+    if restart or not state.running:
+        return State(1, seen.count, 0, 0, params.half, 0, 0), 0, 0
+    moved = wrap(seen.count - state.count, params.count_width)
+    f_w, f_0, f_1, f_2, f_3 = params.fractions
+    most_w, most_gap, most_1, most_2, most_3 = params.limits
+    first = params.filtering
+
+    far_gap = state.lead - (moved << f_0)
+    gap = held(far_gap, most_gap)
+    error = state.w if first else gap
+    size = ~error if error < 0 else error
+    away = -sign_of(error)
+    terms, octaves = params.powers, params.octaves
+
+    # What Taylor's series adds, at the fraction of the state that it is added to.
+    z1 = state.z1 - params.half
+    half_2, half_3 = shift_round_half_up(state.z2, f_2 - f_1 + 1), shift_round_half_up(state.z3, f_3 - f_2 + 1)
+    lead = gap + shift_round_half_up(z1 + half_2, f_1 - f_0) + away * powers.term(terms, first, size, octaves)
+    more_1 = shift_round_half_up(state.z2 + half_3, f_2 - f_1)
+    far_1 = state.z1 + more_1 + away * powers.term(terms, first + 1, size, octaves)
+    if params.order == 2:
+        far_2, far_3 = state.z2 + away * params.relay, 0
+    else:
+        far_2 = (
+            state.z2 + shift_round_half_up(state.z3, f_3 - f_2) + away * powers.term(terms, 2 + first, size, octaves)
+        )
+        far_3 = state.z3 + away * params.relay
+    far_w = 0
+    if first:
+        far_w = state.w + shift_round_half_up(gap, f_0 - f_w) + away * powers.term(terms, 0, size, octaves)
+
+    w, next_1, next_2, next_3 = held(far_w, most_w), held(far_1, most_1), held(far_2, most_2), held(far_3, most_3)
+    flags = int(gap != far_gap or w != far_w) | int(next_1 != far_1) << 1 | int(next_2 != far_2 or next_3 != far_3) << 2
+    if next_1 != far_1:
+        next_2 = next_3 = 0
+    return State(1, seen.count, w, lead, next_1, next_2, next_3), next_1 >> params.output_shift, flags
+
+
+@estimate.register(FloatParams)
+@compiled
+def float_step(params, state, seen, restart):
+    """Take one sample by the published algorithm in float64, unsaturated: the reference for the cost of fixed point."""
+    if restart or not state.running:
+        return State(1, seen.count, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0
+    gap = state.lead - wrap(seen.count - state.count, params.count_width)
+    first, gains = params.filtering, params.gains
+    error = state.w if first else gap
+    away, degree = -sign_of(error), params.order + first + 1
+    root = abs(error) ** (1 / degree)
+
+    lead = gap + state.z1 + state.z2 / 2 + away * gains[first] * root**params.order
+    z1 = state.z1 + state.z2 + state.z3 / 2 + away * gains[first + 1] * root ** (params.order - 1)
+    z2 = state.z2 + state.z3 + away * gains[first + 2] * root ** (params.order - 2)
+    z3 = state.z3 + away * gains[degree - 1] if params.order == 3 else 0.0
+    w = state.w + gap + away * gains[0] * root ** (degree - 1) if first else 0.0
+    return State(1, seen.count, w, lead, z1, z2, z3), z1, 0
