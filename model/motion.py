@@ -39,7 +39,7 @@ class Motion:
         speed_max: largest speed, unit/s.
         travel: length of the travel, unit. The count wraps at four times of it either way, which is no fault.
         jerk_max: bound on the jerk between impacts, unit/s^3; None for one that follows from the acceleration. It sets
-            default gains of `edge-kalman`.
+            default gains of `edge-kalman` and of the Levants of order 2 and 3.
         edge_error: RMS error of single edges, counts; sets default gains of `edge-kalman`.
 
     Raises:

@@ -24,7 +24,7 @@ SECOND = 1 << 10
 RATES = 1e-6, float(RATES_HZ[1])
 """The least and the largest sample rate of a record, Hz."""
 OF_UNIT = re.compile(r"/s(?:\^\(?(\d+)(?:/(\d+))?\)?)?$")
-OF_NAME = {"_sqrt_m_per_s3": 1.5, "_per_s3": 3, "_per_s2": 2, "_per_s": 1, "_hz": 1, "_s": -1}
+OF_NAME = {"_sqrt_m_per_s3": 1.5, "_per_s4": 4, "_per_s3": 3, "_per_s2": 2, "_per_s": 1, "_hz": 1, "_s": -1}
 """The power of 1/s in a gain, by the end of its name: the first that fits."""
 
 

@@ -17,6 +17,7 @@ from hardwall.model.encoder.quadrature import RUN_MAX, Seen
 from hardwall.model.estimators import registry
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.runtime.compiled import compiled
+from stimuli.locked import mean_error
 from stimuli.specs import spec
 
 SAMPLES = int(os.environ.get("HARDWALL_ENDURANCE", "1000000"))
@@ -111,10 +112,13 @@ def test_it_neither_drifts_nor_stops_short(estimator, speed):
     fmt = axis.design.estimator.velocity
     assert all(fmt.min <= low <= high <= fmt.max for low, high, _ in seen)
     # The words repeat themselves in time, so an extreme that a tenth of the run does not reach is not reached later.
-    assert min(low for low, _, _ in seen[SETTLED:]) >= seen[SETTLED - 1][0] - 1
-    assert max(high for _, high, _ in seen[SETTLED:]) <= seen[SETTLED - 1][1] + 1
+    # With filtering they nearly do: the extremes of a count's ripple wander by a hundredth of it.
+    low, high, _ = seen[SETTLED - 1]
+    within = 1 + ((high - low) // 50 if estimator.endswith("-filtering") else 0)
+    assert min(low for low, _, _ in seen[SETTLED:]) >= low - within
+    assert max(high for _, high, _ in seen[SETTLED:]) <= high + within
     if speed != "beyond":
         # The mean velocity is the speed, but for a count gained or lost over a tenth and for the rounding of a word.
         exact = (-1) ** down * axis_spec.clocks_per_sample / period if period else 0.0
-        rounding = fmt.lsb if fmt.f else 0.0
-        assert max(abs(mean * fmt.lsb - exact) for _, _, mean in seen[SETTLED:]) <= 1 / length + rounding
+        off = mean_error(axis.design.estimator) + (fmt.lsb if fmt.f else 0.0)
+        assert max(abs(mean * fmt.lsb - exact) for _, _, mean in seen[SETTLED:]) <= 1 / length + off

@@ -52,7 +52,10 @@ def label_right(axes: Axes, labels: Sequence[tuple[str, float, str]]) -> None:
 
 
 def spread(heights: Sequence[float], sizes: Sequence[float]) -> list[float]:
-    """Return heights for labels of these sizes, in the same order and apart, as near as possible to those given."""
+    """Return heights for labels of these sizes, in the same order and apart, as near as possible to those given.
+
+    None is below 0, where the panel ends.
+    """
     groups: list[tuple[float, list[int]]] = []
     for index in sorted(range(len(heights)), key=lambda index: heights[index]):
         group = (heights[index], [index])
@@ -63,8 +66,9 @@ def spread(heights: Sequence[float], sizes: Sequence[float]) -> list[float]:
             group = (sum(heights[each] for each in members) / len(members), members)
         groups.append(group)
     places = [0.0] * len(heights)
+    top = 0.0
     for middle, members in groups:
-        top = middle - _half((middle, members), sizes)
+        top = max(top, middle - _half((middle, members), sizes))
         for index in members:
             places[index] = top + sizes[index] / 2
             top += sizes[index]

@@ -70,14 +70,14 @@ def test_settings_that_are_refused(changes, said):
 def test_a_bound_that_sets_no_gain_of_an_estimator_is_refused(estimator):
     """It was taken, and changed nothing."""
     spec = replay(swing(), estimator, coarsen=COARSEN, acceleration_max_counts_per_s2=BOUND).spec
-    for name, field in (
-        ("jerk_max_counts_per_s3", "jerk_max_m_per_s3"),
-        ("edge_error_max_counts", "edge_error_max_counts"),
+    for name, field, value in (
+        ("jerk_max_counts_per_s3", "jerk_max_m_per_s3", 1.0),
+        ("edge_error_max_counts", "edge_error_max_counts", 1e-3),
     ):
-        gains = [replace(spec, **{field: value}).design.gains for value in (1e-3, 1e-2)]
-        changes = {f"controller.{name}": 1e-3}
+        gains = [replace(spec, **{field: each}).design.gains for each in (value, 10 * value)]
+        changes = {f"controller.{name}": value}
         if gains[0] != gains[1]:
-            assert getattr(settings_of(changes, estimator), name) == 1e-3
+            assert getattr(settings_of(changes, estimator), name) == value
         else:
             with pytest.raises(SettingError, match=f"is not a key of a replay with {estimator}, which has "):
                 settings_of(changes, estimator)

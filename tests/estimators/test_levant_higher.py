@@ -17,7 +17,14 @@ from hardwall.model.axis.axis import Axis
 from hardwall.model.encoder.quadrature import seen_count
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.levant_higher import Filtering2, Filtering3, Order2, Order3
-from hardwall.model.estimators.levant_higher_design import LAMBDA, PEAKS, Design, State
+from hardwall.model.estimators.levant_higher_design import (
+    LAMBDA,
+    LARGEST_L,
+    MEAN_ERROR,
+    PEAKS,
+    Design,
+    State,
+)
 from hardwall.model.runtime.compiled import compiled
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
 from hardwall.testing.estimators import follow, model
@@ -257,6 +264,46 @@ def test_the_peaks_are_those_of_the_differential_equation(name):
         _peaks(d.order, d.filtering, gains, half_period, math.ceil(half_period / 1e-3), found)
     for peak, figure in zip(found, PEAKS[d.order, d.filtering], strict=True):
         assert 0.94 * figure <= peak <= figure
+
+
+@compiled
+def _mean(order, filtering, gains, moved, period, phase, settle, samples):
+    """Return how far the mean of z1 is from a steady speed of `moved` counts in `period` samples, by the equation."""
+    n, s, d, total = order + filtering, np.zeros(5), np.zeros(5), 0.0
+    speed = moved / period
+    s[filtering + 1] = speed
+    for k in range(settle + samples):
+        f = math.floor(moved * k / period + phase)
+        error = s[0] if filtering else s[0] - f
+        away, root = -float(np.sign(error)), abs(error) ** (1 / (n + 1))
+        for j in range(n + 1):
+            d[j] = (
+                away * gains[n - j] * root ** (n - j)
+                + (s[j + 1] if j < n else 0.0)
+                + (s[j + 2] / 2 if filtering <= j <= n - 2 else 0.0)
+                - (f if j == filtering - 1 else 0.0)
+            )
+        for j in range(n + 1):
+            s[j] += d[j]
+        total += s[filtering + 1] - speed if k >= settle else 0.0
+    return total / samples
+
+
+@every
+def test_the_mean_where_counts_lock_is_as_near_as_its_figure(name):
+    """Over patterns of up to 12 samples, three phases, and the largest L and less: none is more, and some are close."""
+    d, worst = design(name), 0.0
+    n = d.degree - 1
+    for own in np.geomspace(LARGEST_L ** (-1 / (d.order + 1)), 60, 40)[[*range(12), 20, 30, 39]]:
+        gains = np.array([LAMBDA[n][j] * own ** (-(d.order + 1) * (n + 1 - j) / (n + 1)) for j in range(n + 1)])
+        for period, moved in ((q, p) for q in range(1, 13) for p in range(q) if math.gcd(p, q) == 1):
+            samples = 4 * period * max(1, int(200 * own / period))
+            for phase in (0.0, 0.01 / period, 0.5 / period):
+                settle = int(60 * own) // period * period
+                found = _mean(d.order, d.filtering, gains, moved, period, phase, settle, samples)
+                worst = max(worst, abs(found) * own)
+    figure = MEAN_ERROR[d.order, d.filtering]
+    assert 0.9 * figure <= worst <= figure
 
 
 @every

@@ -56,6 +56,10 @@ def test_places_are_apart_in_order_and_near():
     assert places[1] == pytest.approx(0.51)
 
 
+def test_places_end_where_the_panel_ends():
+    assert spread([0.02, 0.03, 0.01], [0.1] * 3) == pytest.approx([0.15, 0.25, 0.05])
+
+
 def boxes(texts) -> list:
     renderer = texts[0].figure.canvas.get_renderer()
     texts[0].figure.draw_without_rendering()

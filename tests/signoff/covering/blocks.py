@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from hardwall.model.estimators.registry import ESTIMATORS
+from hardwall.hdl.estimators.registry import ESTIMATORS
 
 TESTS = Path(__file__).parents[2]
 
@@ -32,9 +32,12 @@ class Block:
 RECORDED = ("component.component",)
 """The module of a block that a recorder feeds."""
 BLOCKS = (
-    *(Block(f"arithmetic/{name}") for name in ("divide", "divisionless", "signed_divide", "sqrt")),
+    *(Block(f"arithmetic/{name}") for name in ("divide", "divisionless", "powers", "signed_divide", "sqrt")),
     *(Block(f"estimators/{name}") for name in ("bursts", "cycle_times", "history", "kept_edges")),
-    *(Block("estimators/finite_difference" if n == "fdm" else f"estimators/{n.replace('-', '_')}") for n in ESTIMATORS),
+    *(
+        Block(f"estimators/{name}")
+        for name in dict.fromkeys(e.__module__.rpartition(".")[2] for e in ESTIMATORS.values())
+    ),
     Block("encoder/quadrature", RECORDED),
     Block("encoder/scale_map", RECORDED),
     Block("axis/wall", ("component.law",)),

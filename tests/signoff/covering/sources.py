@@ -30,7 +30,7 @@ ESTIMATORS = {
     name: module.__name__
     for name, design in registry.ESTIMATORS.items()
     for module in vars(registry).values()
-    if isinstance(module, ModuleType) and getattr(module, "Design", None) is design
+    if isinstance(module, ModuleType) and any(own is design for own in vars(module).values())
 }
 """The module of every estimator."""
 PACKAGES = {"hardwall.testing": Path("tests/benches"), "hardwall": Path()}
