@@ -2,8 +2,6 @@
 
 import re
 
-from ..model.checks import shown
-
 PLAIN = re.compile(r"[+-]?(([0-9]+\.?[0-9]*|\.[0-9]+)(e[+-]?[0-9]+)?|inf|infinity|nan)", re.IGNORECASE)
 """A decimal number. What is no finite one is for the range of its option to refuse."""
 OTHER = re.compile(
@@ -24,6 +22,8 @@ def plain_number(text: str) -> float:
         ValueError: if it is no number, or one with `_` between digits, of another base or in other digits than 0 to 9.
     """
     if not is_plain(text):
+        from ..model.checks import shown  # noqa: PLC0415  (NumPy comes with it, and the help needs none)
+
         raise ValueError(f"must be a decimal number such as 0.5 or 5e-4, not {shown(text)}")
     return float(text)
 
