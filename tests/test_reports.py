@@ -81,10 +81,10 @@ def test_what_only_shows_is_no_source_and_the_hardware_only_of_what_runs_it():
 @pytest.mark.parametrize(
     ("command", "own", "others"),
     [
-        ("accuracy", {"kalman", "levant", "mt", "window"}, set()),
-        ("rendered --estimators all", {"kalman", "levant", "mt", "window"}, set()),
-        ("accuracy --estimators kalman,foaw:best-fit", {"kalman", "foaw", "levant"}, {"mt", "window"}),
-        ("zwidth --estimators adjusted,fdm-500", {"levant", "butterworth"}, {"kalman", "mt", "window"}),
+        ("accuracy", {"kalman", "levant", "mt", "tracking_loop"}, set()),
+        ("rendered --estimators all", {"kalman", "levant", "mt", "tracking_loop"}, set()),
+        ("accuracy --estimators kalman,foaw:best-fit", {"kalman", "foaw", "levant"}, {"mt", "tracking_loop"}),
+        ("zwidth --estimators adjusted,fdm-500", {"levant", "butterworth"}, {"kalman", "mt", "tracking_loop"}),
     ],
 )
 def test_an_estimator_that_a_command_does_not_name_is_no_source(command, own, others):
