@@ -2,14 +2,16 @@
 
 import os
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from ..model.runtime.extras import version_of_project
 from .errors import BadInput
+from .plain_numbers import is_plain
 from .terminal import hear_stages
 
 COMMANDS = {
@@ -83,7 +85,25 @@ def loaded(name: str) -> Any:
     """
     alone = typer.Typer(add_completion=False)
     alone.command(name, help=COMMANDS[name])(import_module(f".{name}", __package__).command)
-    return typer.main.get_command(alone)
+    command = typer.main.get_command(alone)
+    for param in command.params:
+        if isinstance(param, TyperOption) and param.type_descriptor.annotation in (int, float):
+            param.process_value = _only_plain(param)
+    return command
+
+
+def _only_plain(option: TyperOption) -> Callable[[Any, Any], Any]:
+    """Return what takes the value of an option, if that is a plain number: Python's own has `_` between digits, too."""
+    process = option.process_value
+
+    def take(context: Any, value: Any) -> Any:
+        if isinstance(value, str) and not is_plain(value):
+            from .refusal import refused  # noqa: PLC0415  (its words come from what a scene is made of)
+
+            raise BadInput(refused(option, value))
+        return process(context, value)
+
+    return take
 
 
 def _version(wanted: bool) -> None:

@@ -14,6 +14,7 @@ from ..model.axes.axis import AXES_MAX
 from ..model.checks import shown
 from ..model.estimators import registry
 from .errors import BadInput
+from .plain_numbers import plain_number
 
 Estimator = Literal[tuple(registry.ESTIMATORS)]
 Backend = Literal["float", "fixed", "rtl"]
@@ -74,7 +75,7 @@ def numbers_of(text: str, option: str, least: float, most: float, unit: str, who
     numbers = []
     for word in text.split(","):
         try:
-            number = float(word)
+            number = plain_number(word)
         except ValueError:
             number = math.nan
         if not least <= number <= most or (whole and number != int(number)):

@@ -13,6 +13,10 @@ def refusal(error: typer.TyperException) -> str:
     option, cause = getattr(error, "param", None), error.__cause__
     if not isinstance(cause, ValidationError) or not isinstance(option, TyperOption):
         return " ".join(error.format_message().split())
+    return refused(option, cause.errors()[0]["input"])
+
+
+def refused(option: TyperOption, value: object) -> str:
+    """Return that an option must be another value than what was given."""
     limits = Field(ge=option.min, le=option.max).metadata
-    value = shown(cause.errors()[0]["input"])
-    return f"{option.opts[0]} must be {accepted(option.type_descriptor.annotation, limits)}, not {value}"
+    return f"{option.opts[0]} must be {accepted(option.type_descriptor.annotation, limits)}, not {shown(value)}"

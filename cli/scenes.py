@@ -1,6 +1,5 @@
 """The options that say which scene, and what of it is changed or measured; and the checks of their values."""
 
-import re
 from typing import Annotated, Any, Literal
 
 import typer
@@ -15,6 +14,7 @@ from ..sim.walls.methods import Curve, label
 from ..sim.walls.worst_variant import HELD_BY
 from .errors import BadInput
 from .options import numbers_of
+from .plain_numbers import has_other_numbers, is_plain, plain_number
 
 PartName = Literal[tuple(PARTS)]
 
@@ -84,18 +84,18 @@ def value_of(key: str, text: str) -> Any:
     """Return the value of a key on the command line: one TOML value; what is no TOML is a text of its own."""
     if not text.isprintable():
         raise BadInput(f"--set {shown(key)} must be one value on one line, not {shown(text)}")
+    if has_other_numbers(text):
+        raise BadInput(f"--set {shown(key)} must have decimal numbers, such as 0.5 or 5e-4, not {shown(text)}")
     try:
         # Nothing can follow a value in an inline table but another key.
         found = toml_of(f"table = {{ value = {text} }}")
     except ValueError:
-        return float(text) if DECIMAL.fullmatch(text) else text
+        # `.35` and `2.` are numbers as people write them, and TOML does not.
+        return plain_number(text) if is_plain(text) else text
     if found.keys() != {"table"} or found["table"].keys() != {"value"}:
         raise BadInput(f"--set {shown(key)} must be one value, not {shown(text)}")
     return found["table"]["value"]
 
-
-DECIMAL = re.compile(r"[+-]?([0-9]+\.[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
-"""A number as people write it and TOML does not, `.35` or `2.`."""
 
 GAINS = ("controller.estimator", "controller.output", "controller.gains")
 WALL = ("wall.stiffness_n_per_m", "wall.damping_n_s_per_m")

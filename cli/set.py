@@ -8,6 +8,7 @@ from ..host.port import BAUD
 from ..model.checks import shown
 from ..model.runtime.result import Values
 from .errors import BadInput
+from .plain_numbers import plain_number
 from .port import BaudOption, IdentityOption, PaceOption, PortArgument, axis_at
 from .report import ReportOptions, reports
 
@@ -33,10 +34,10 @@ def values_of(words: list[str]) -> dict[str, float]:
     values: dict[str, float] = {}
     for word in words:
         name, equals, text = word.partition("=")
+        if not equals or name in values:
+            raise BadInput(f"a word must be NAME=NUMBER, each once, not {shown(word)}")
         try:
-            if not equals or name in values:
-                raise ValueError
-            values[name] = float(text)
-        except ValueError:
-            raise BadInput(f"a word must be NAME=NUMBER, each once, not {shown(word)}") from None
+            values[name] = plain_number(text)
+        except ValueError as error:
+            raise BadInput(f"{shown(name)} {error}") from None
     return values

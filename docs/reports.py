@@ -3,7 +3,9 @@
 `docs/results/reports.toml` names them. `make results` runs the commands whose report is stale, or of those named by
 `ONLY`; `LIST=1` only says which are, and how long each took. A report is kept as `docs/results/reports/NAME.json`, with
 its command, the version, the date and the machine. Its origin is a digest of the code of every module that the command
-imports, but for those that only show or keep what was computed; comments and docstrings are no part of it.
+imports, but for those that only show or keep what was computed; comments and docstrings are no part of it. Where the
+command names its estimators, the others are no part of it either, so that a new estimator leaves most reports as they
+are.
 """
 
 import argparse
@@ -20,11 +22,14 @@ import time
 import tomllib
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from hardwall.hdl.estimators import registry as blocks
 from hardwall.model.runtime.provenance import imported
-from signoff.covering.sources import code_of
+from hardwall.sim.walls.methods import methods
+from signoff.covering.sources import ESTIMATORS, code_of
 
 DOCS = Path(__file__).absolute().parent
 TREE = DOCS.parent
@@ -35,6 +40,10 @@ HARDWARE = "hdl", "sim/boards", "sim/rtl"
 """Rooms that matter to what runs the RTL, or counts its cells."""
 OF_HARDWARE = "bench", "board", "choose", "costs", "synth"
 """Commands that do."""
+REGISTRIES = "model/estimators/registry.py", "hdl/estimators/registry.py"
+"""What imports every estimator."""
+DEFAULT = "levant"
+"""The estimator of an axis that names none."""
 VERSION = tomllib.loads((TREE / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
 
 
@@ -107,19 +116,38 @@ def _files(name: str) -> Iterator[Path]:
         yield from (file for file in (inside.with_suffix(".py"), inside / "__init__.py") if file.is_file())
 
 
+def _chosen(words: list[str]) -> set[str]:
+    """Return the modules of the estimators that a command names, and of the default one; empty if it names none."""
+    named = next((after.split(",") for before, after in pairwise(words) if before == "--estimators"), [])
+    if not named or "all" in named:
+        return set()
+    known = methods()
+    names = {known[word].estimator if word in known else word.partition(":")[0] for word in named}
+    return {of for name in (*names, DEFAULT) for of in (ESTIMATORS[name], blocks.ESTIMATORS[name].__module__)}
+
+
 def sources_of(command: str) -> list[Path]:
-    """Return the sources that the numbers of a command come from: what it imports, directly or not."""
+    """Return the sources that the numbers of a command come from: what it imports, directly or not.
+
+    Where the command names estimators, they come in the place of what imports all of them.
+    """
     words = shlex.split(command)
+    chosen = _chosen(words)
     hardware = words[0] in OF_HARDWARE or "rtl" in words
     others = (*SHOWING, *(() if hardware else HARDWARE))
     own = TREE / "cli" / f"{words[0]}.py"
+    registries = {TREE / name for name in REGISTRIES}
     waiting, seen = [own], set[Path]()
     while waiting:
         file = waiting.pop()
         if file not in seen:
             seen.add(file)
             package = ".".join(["hardwall", *file.relative_to(TREE).parent.parts])
-            waiting += (found for name in imported(file.read_bytes(), package) for found in _files(name))
+            names = imported(file.read_bytes(), package)
+            if chosen and file in registries:
+                seen.remove(file)
+                names = chosen
+            waiting += (found for name in names for found in _files(name))
     # A package passes names on, and of the command line the command alone has defaults that matter.
     named = (file for file in seen if file.name != "__init__.py")
     return sorted(file for file in named if file == own or not any(file.is_relative_to(TREE / room) for room in others))

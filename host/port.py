@@ -1,10 +1,11 @@
 """The line to a board: requests of Modbus RTU, one after the other, on a serial port or a port of the network."""
 
+import math
 import secrets
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager
 from typing import Any
 
 from pymodbus.exceptions import ConnectionException, ModbusException
@@ -33,6 +34,8 @@ MACHINE_S = 0.02
 """The time for which this machine may keep an answer, or a request, while it does something else."""
 BEAT_S = 0.15
 """The longest time for which other requests wait for a beat of which one request is lost."""
+FIRST_TRIES = 2
+"""Requests that are sent in `answer_s` to a board that has not answered yet, for one may be lost."""
 TRIES = 5
 """Attempts to find the beginning of an answer again."""
 PAUSE_S = 0.025
@@ -109,6 +112,10 @@ class Port:
     def pace(self) -> float:
         """The seconds of the board in a second, or fewer: what was given, or else what it tells now."""
         return self._given if self._told is None else self._told.pace
+
+    @property
+    def _is_of_network(self) -> bool:
+        return self.name.startswith(NETWORK)
 
     @property
     def _answer_s(self) -> float:
@@ -233,7 +240,7 @@ class Port:
             )
 
     def _answer(self, request: Request) -> Any:
-        wait_s = self._answer_s
+        wait_s = self._answer_s if self._known else self._answer_s / FIRST_TRIES
         if self._known and not self._shared:
             wait_s = min(wait_s, self._line_s(request) + (BRIDGE_S + MACHINE_S) / self.pace)
         self._sent_s = time.monotonic()
@@ -249,6 +256,9 @@ class Port:
                     f"nothing answers any more at {self.name}, to the request to {request.what}, which may have been "
                     "carried out: is the cable in, and the board powered?"
                 ) from None
+            if self._is_of_network:
+                said = "a board that is powered and configured, and is it this port"
+                raise SilentError(f"nothing answers at {self.name}: is behind it {said}?") from None
             raise SilentError(
                 f"nothing answers at {self.name} at {self._baud} baud: is the board powered and configured, "
                 "and is it this port and this rate?"
@@ -257,26 +267,32 @@ class Port:
     def _lost(self) -> PortError:
         """Return the error of a port that is gone from now on."""
         self._gone = True
-        if self.name.startswith(NETWORK) and not self._known:
+        if self._is_of_network and not self._known:
             return PortError(
                 f"{self.name} ended the connection at once: it is no board, or has as many programs as it takes"
             )
         return PortError(f"{self.name} is gone: is the cable in, and the board powered?")
 
     def _find_step(self) -> None:
-        """Let the board repeat random words until it says the last one."""
+        """Let the board repeat random words until it says the last one; at first for `answer_s` in all."""
+        until_s = math.inf if self._known else time.monotonic() + self._answer_s
         pause_s = PAUSE_S / self.pace
         silent_s = self._sent_s + pause_s - time.monotonic()
         for tries_left in reversed(range(TRIES)):
             self._drain(silent_s)
             silent_s = pause_s
             request = Request.echoing(secrets.token_bytes(2))
-            with suppress(*([SilentError] if tries_left else [])):
+            try:
                 if request.fits(self._answer(request)):
-                    if not self._known and self.name.startswith(NETWORK):
+                    if not self._known and self._is_of_network:
                         self._shared = not self._answer(Request.lease()).isError()
                     self._in_step = self._known = True
                     return
+            except SilentError:
+                if not tries_left or time.monotonic() >= until_s:
+                    raise
+            if time.monotonic() >= until_s:
+                break
         if self._known:
             # What came may have been late, of requests before.
             raise SilentError(f"what answers at {self.name} is late, or does not repeat any more what it is told")

@@ -78,6 +78,23 @@ def test_what_only_shows_is_no_source_and_the_hardware_only_of_what_runs_it():
     assert ROOT / "hdl/axis/axis.py" in reports.sources_of("bench")
 
 
+@pytest.mark.parametrize(
+    ("command", "own", "others"),
+    [
+        ("accuracy", {"kalman", "levant", "mt", "tracking_loop"}, set()),
+        ("rendered --estimators all", {"kalman", "levant", "mt", "tracking_loop"}, set()),
+        ("accuracy --estimators kalman,foaw:best-fit", {"kalman", "foaw", "levant"}, {"mt", "tracking_loop"}),
+        ("zwidth --estimators adjusted,fdm-500", {"levant", "butterworth"}, {"kalman", "mt", "tracking_loop"}),
+    ],
+)
+def test_an_estimator_that_a_command_does_not_name_is_no_source(command, own, others):
+    for room, of in (("model", command), ("hdl", f"{command} --backend rtl")):
+        found = {path.stem for path in reports.sources_of(of) if path.is_relative_to(ROOT / room / "estimators")}
+        assert own <= found
+        assert not others & found
+        assert ("registry" in found) == (not others)
+
+
 def test_a_command_that_fails_leaves_no_report(monkeypatch, tmp_path):
     monkeypatch.setattr(reports, "KEPT", tmp_path)
     with pytest.raises(reports.subprocess.CalledProcessError):

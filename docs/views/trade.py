@@ -54,7 +54,9 @@ def parts(report: Report) -> list[str]:
     """Return what parts do to the edge, those that a scene has and those that it lacks; the largest area first."""
     chosen = sorted(_of(report, "parts", "lacked"), key=_farthest)[-ROWS:]
     chosen.sort(key=lambda each: -sum(move["area_ratio"] for move in each["moves"].values()))
-    return table(["area, of that with all parts", *_names(report)], ([each["label"], *_moves(each)] for each in chosen))
+    return table(
+        ["area, relative to the scene as it is", *_names(report)], ([each["label"], *_moves(each)] for each in chosen)
+    )
 
 
 def shortcuts(report: Report) -> list[str]:

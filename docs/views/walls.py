@@ -53,7 +53,7 @@ def maps(report: Report) -> list[str]:
 
 def facts(*reports: Report) -> list[str]:
     """Return the facts of the founding paper's Figure 5, and in how many draws each holds, a column a device."""
-    heads = ["fact of the paper, holds in draws", *(f"`{report['scene']}`" for report in reports)]
+    heads = ["fact of the paper, and share of draws with it", *(f"`{report['scene']}`" for report in reports)]
     same = zip(*(report["facts"] for report in reports), strict=True)
     return table(heads, ([each[0]["text"], *(f"{100 * one['share']:.0f} %" for one in each)] for each in same))
 
@@ -121,7 +121,7 @@ def cutoffs(*reports: Report) -> list[str]:
 def cures(report: Report) -> list[str]:
     """Return the regions of the methods of `hardwall drop`, the largest first, in parts of the paper's best."""
     ordered = _by_area(report["methods"].values())
-    heads = ["method", "area, of Levant u's with adjusted gains", "largest K (kN/m)", "to B (N s/m)"]
+    heads = ["method", "area, relative to Levant u, adjusted gains", "largest K (kN/m)", "to B (N s/m)"]
     return table(
         heads,
         ([each["label"], number(each["of_papers_best"], 2), _largest(each), _end(each)] for each in ordered),
@@ -131,7 +131,7 @@ def cures(report: Report) -> list[str]:
 def stiffest(report: Report) -> list[str]:
     """Return the largest stable stiffness of every method by rate, with the interval of the starts."""
     rates = report["methods"][0]["rates_hz"]
-    heads = ["largest K (kN/m)", "own rates", *map(rate_text, rates), "times"]
+    heads = ["largest K (kN/m)", "own rates", *map(rate_text, rates), "best over own"]
     rows = []
     for each in report["methods"]:
         values = [

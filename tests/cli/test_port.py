@@ -172,7 +172,7 @@ def test_watch_shows_a_line_and_home_finds_the_index(virtual, called):
         (["set", "PORT", "speed=1"], 2, "word must be one of the board's, not 'speed'; they are preload_count, "),
         (["set", "PORT", "wall_left"], 2, "a word must be NAME=NUMBER, each once, not 'wall_left'"),
         (["set", "PORT", "wall_left=1", "wall_left=0"], 2, "a word must be NAME=NUMBER, each once, not 'wall_left=0'"),
-        (["set", "PORT", "wall_left=one"], 2, "a word must be NAME=NUMBER, each once, not 'wall_left=one'"),
+        (["set", "PORT", "wall_left=one"], 2, "'wall_left' must be a decimal number such as 0.5 or 5e-4, not 'one'"),
         (["home", "PORT", "--at", "1e9"], 2, "--at must be -0.65536 to 0.65535 m, not 1000000000.0"),
         (["home", "PORT", "--seconds", "-1"], 2, "--seconds must be 0 to 1e+06 s, not -1.0"),
         (["arm", "PORT", "--seconds", "nan"], 2, "--seconds must be 0 to 1e+06 s, not nan"),
