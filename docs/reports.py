@@ -36,6 +36,8 @@ TREE = DOCS.parent
 LIST, KEPT, PICTURES = DOCS / "results/reports.toml", DOCS / "results/reports", DOCS / "pictures"
 SHOWING = "cli", "model/runtime", "sim/jobs", "sim/pictures"
 """Rooms that change no number, but for the command itself."""
+OPTIONS = "cli/scenes.py"
+"""What checks the options of all commands: what it imports for some is no source of the others."""
 HARDWARE = "hdl", "sim/boards", "sim/rtl"
 """Rooms that matter to what runs the RTL, or counts its cells."""
 OF_HARDWARE = "bench", "board", "choose", "costs", "synth"
@@ -140,7 +142,7 @@ def sources_of(command: str) -> list[Path]:
     waiting, seen = [own], set[Path]()
     while waiting:
         file = waiting.pop()
-        if file not in seen:
+        if file not in seen and file != TREE / OPTIONS:
             seen.add(file)
             package = ".".join(["hardwall", *file.relative_to(TREE).parent.parts])
             names = imported(file.read_bytes(), package)

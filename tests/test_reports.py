@@ -74,6 +74,7 @@ def test_what_only_shows_is_no_source_and_the_hardware_only_of_what_runs_it():
     assert {path.relative_to(ROOT).parts[0] for path in sources} == {"cli", "model", "sim"}
     assert [path.name for path in sources if path.is_relative_to(ROOT / "cli")] == ["accuracy.py"]
     assert ROOT / "model/estimators/kalman.py" in reports.sources_of("accuracy")
+    assert ROOT / "sim/estimates/accuracy.py" in set(sources) - set(reports.sources_of("zwidth"))
     assert ROOT / "hdl/axis/axis.py" in reports.sources_of("accuracy --backend rtl")
     assert ROOT / "hdl/axis/axis.py" in reports.sources_of("bench")
 
