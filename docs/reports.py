@@ -20,10 +20,11 @@ import subprocess
 import sys
 import time
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from hardwall.hdl.estimators import registry as blocks
@@ -40,12 +41,16 @@ OPTIONS = "cli/scenes.py"
 """What checks the options of all commands: what it imports for some is no source of the others."""
 HARDWARE = "hdl", "sim/boards", "sim/rtl"
 """Rooms that matter to what runs the RTL, or counts its cells."""
-OF_HARDWARE = "bench", "board", "choose", "costs", "synth"
+OF_HARDWARE = "axes", "bench", "bits", "board", "choose", "costs", "synth"
 """Commands that do."""
 REGISTRIES = "model/estimators/registry.py", "hdl/estimators/registry.py"
 """What imports every estimator."""
+OF_EVERY = "accuracy", "bench", "bits", "choose", "costs"
+"""Commands that take every estimator if none is named; others take those of their scene, which their report names."""
 DEFAULT = "levant"
 """The estimator of an axis that names none."""
+NOTHING: Mapping[str, Any] = MappingProxyType({})
+"""The report of a command that has not run."""
 VERSION = tomllib.loads((TREE / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
 
 
@@ -108,7 +113,10 @@ def kept(name: str) -> Kept | None:
 def is_stale(report: Wanted) -> bool:
     """Return whether a report was never made, or by another command, or from other code."""
     found = kept(report.name)
-    return found is None or (found.command, found.origin) != (f"hardwall {report.command}", origin(report.command))
+    return found is None or (found.command, found.origin) != (
+        f"hardwall {report.command}",
+        origin(report.command, found.report),
+    )
 
 
 def _files(name: str) -> Iterator[Path]:
@@ -118,23 +126,51 @@ def _files(name: str) -> Iterator[Path]:
         yield from (file for file in (inside.with_suffix(".py"), inside / "__init__.py") if file.is_file())
 
 
-def _chosen(words: list[str]) -> set[str]:
-    """Return the modules of the estimators that a command names, and of the default one; empty if it names none."""
+@functools.cache
+def _read(content: bytes, package: str) -> tuple[str, tuple[str, ...]]:
+    """Return the code of a source, and the modules that it imports."""
+    return code_of(content), tuple(imported(content, package))
+
+
+def _source(file: Path) -> tuple[str, tuple[str, ...]]:
+    """Return the code of a file, and the modules that it imports."""
+    return _read(file.read_bytes(), ".".join(["hardwall", *file.relative_to(TREE).parent.parts]))
+
+
+def _strings(said: Any) -> Iterator[str]:
+    """Yield every text of a report, and every name in it."""
+    if isinstance(said, str):
+        yield said
+    elif isinstance(said, Mapping):
+        yield from said
+        said = list(said.values())
+    if isinstance(said, list):
+        yield from chain.from_iterable(map(_strings, said))
+
+
+def _chosen(words: list[str], report: Mapping[str, Any]) -> set[str]:
+    """Return the modules of the estimators that a command or its report names, and of the default; empty for all."""
     named = next((after.split(",") for before, after in pairwise(words) if before == "--estimators"), [])
-    if not named or "all" in named:
+    if "all" in named or (not named and words[0] in OF_EVERY):
         return set()
     known = methods()
     names = {known[word].estimator if word in known else word.partition(":")[0] for word in named}
-    return {of for name in (*names, DEFAULT) for of in (ESTIMATORS[name], blocks.ESTIMATORS[name].__module__)}
+    names |= {*_strings(report)} & {*ESTIMATORS}
+    return {of for name in ({*names, DEFAULT} if names else ()) for of in _modules(name)}
 
 
-def sources_of(command: str) -> list[Path]:
+def _modules(name: str) -> tuple[str, str]:
+    """Return the modules of an estimator, of the model and of the hardware."""
+    return ESTIMATORS[name], blocks.ESTIMATORS[name].__module__
+
+
+def sources_of(command: str, report: Mapping[str, Any] = NOTHING) -> list[Path]:
     """Return the sources that the numbers of a command come from: what it imports, directly or not.
 
-    Where the command names estimators, they come in the place of what imports all of them.
+    Where the command or its report names estimators, they come in the place of what imports all of them.
     """
     words = shlex.split(command)
-    chosen = _chosen(words)
+    chosen = _chosen(words, report)
     hardware = words[0] in OF_HARDWARE or "rtl" in words
     others = (*SHOWING, *(() if hardware else HARDWARE))
     own = TREE / "cli" / f"{words[0]}.py"
@@ -144,8 +180,7 @@ def sources_of(command: str) -> list[Path]:
         file = waiting.pop()
         if file not in seen and file != TREE / OPTIONS:
             seen.add(file)
-            package = ".".join(["hardwall", *file.relative_to(TREE).parent.parts])
-            names = imported(file.read_bytes(), package)
+            _, names = _source(file)
             if chosen and file in registries:
                 seen.remove(file)
                 names = chosen
@@ -155,12 +190,16 @@ def sources_of(command: str) -> list[Path]:
     return sorted(file for file in named if file == own or not any(file.is_relative_to(TREE / room) for room in others))
 
 
-@functools.cache
-def origin(command: str) -> str:
-    """Return a digest of the code that a command's report comes from, of the project's scenes, and of its own scene."""
+def origin(command: str, report: Mapping[str, Any] = NOTHING) -> str:
+    """Return a digest of the code that a command's report comes from, of the project's scenes, and of its own scene.
+
+    Args:
+        command: the command.
+        report: what it said; without it, all estimators are its sources.
+    """
     digest = hashlib.sha256()
-    for file in sources_of(command):
-        digest.update(f"{file.relative_to(TREE)}\0{code_of(file.read_bytes())}\0".encode())
+    for file in sources_of(command, report):
+        digest.update(f"{file.relative_to(TREE)}\0{_source(file)[0]}\0".encode())
     own = (TREE / word for word in shlex.split(command) if word.endswith(".toml"))
     for scene in (*sorted((TREE / "sim/scene/builtin").glob("*.toml")), *own):
         digest.update(scene.read_bytes())
@@ -178,18 +217,20 @@ def make(report: Wanted) -> Kept:
     Raises:
         subprocess.CalledProcessError: if the command fails.
     """
-    began, came_from = time.monotonic(), origin(report.command)
+    began, before = time.monotonic(), origin(report.command)
     program = [sys.executable, "-c", "from hardwall.cli.app import main; main()"]
     done = subprocess.run([*program, *report.words], cwd=TREE, stdout=subprocess.PIPE, text=True, check=True)
+    # A folder of the build is named from the checkout on.
+    said = json.loads(done.stdout.replace(f"{TREE}/", ""))
     made = Kept(
         command=f"hardwall {report.command}",
         version=VERSION,
         date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
         machine=machine(),
-        origin=came_from,
+        # Sources that changed meanwhile may be any of them.
+        origin=origin(report.command, said) if origin(report.command) == before else "",
         seconds=round(time.monotonic() - began, 1),
-        # A folder of the build is named from the checkout on.
-        report=json.loads(done.stdout.replace(f"{TREE}/", "")),
+        report=said,
     )
     KEPT.mkdir(exist_ok=True)
     unfinished = KEPT / f"{report.name}.new"

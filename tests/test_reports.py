@@ -69,6 +69,20 @@ def test_a_report_is_stale_if_its_code_or_its_command_has_changed(monkeypatch, t
     assert reports.is_stale(wanted)
 
 
+def test_the_estimators_that_a_report_names_are_its_sources():
+    said = {"maps": [{"label": "a", "estimator": "mt"}], "area": {"kalman": 1.0}}
+    for command, found in (
+        ("zwidth", {"kalman", "mt", "levant"}),
+        ("zwidth --estimators foaw", {"foaw", "kalman", "mt"}),
+    ):
+        sources = {path.stem for path in reports.sources_of(command, said)}
+        assert found <= sources
+        assert not {"period", "tracking_loop"} & sources
+    # A command of every estimator has the next one, too.
+    assert {"period", "tracking_loop"} <= {path.stem for path in reports.sources_of("bench", said)}
+    assert {"period", "tracking_loop"} <= {path.stem for path in reports.sources_of("zwidth")}
+
+
 def test_what_only_shows_is_no_source_and_the_hardware_only_of_what_runs_it():
     sources = reports.sources_of("accuracy --rates 1e3")
     assert {path.relative_to(ROOT).parts[0] for path in sources} == {"cli", "model", "sim"}
