@@ -77,10 +77,10 @@ def test_the_estimators_that_a_report_names_are_its_sources():
     ):
         sources = {path.stem for path in reports.sources_of(command, said)}
         assert found <= sources
-        assert not {"period", "tracking_loop"} & sources
+        assert not {"butterworth", "tracking_loop"} & sources
     # A command of every estimator has the next one, too.
-    assert {"period", "tracking_loop"} <= {path.stem for path in reports.sources_of("bench", said)}
-    assert {"period", "tracking_loop"} <= {path.stem for path in reports.sources_of("zwidth")}
+    assert {"butterworth", "tracking_loop"} <= {path.stem for path in reports.sources_of("bench", said)}
+    assert {"butterworth", "tracking_loop"} <= {path.stem for path in reports.sources_of("zwidth")}
 
 
 def test_what_only_shows_is_no_source_and_the_hardware_only_of_what_runs_it():
