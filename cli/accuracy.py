@@ -19,6 +19,8 @@ from .study import study
 
 ACCELERATIONS_M_PER_S2 = 1e-9, 1e6
 """The least and the largest bound C: one that shows after minutes, and one beyond any motor."""
+JERKS_M_PER_S3 = 1e-9, 1e12
+"""The least and the largest bound on the jerk."""
 DRAWN_HZ_MAX = 100_000
 """The highest rate at which Figure 1 is drawn, sample by sample."""
 
@@ -50,6 +52,10 @@ def command(
         float | None,
         typer.Option(metavar="C", help="acceleration that sets the gains, m/s^2", show_default="the signal's own"),
     ] = None,
+    jerk_max: Annotated[
+        float | None,
+        typer.Option(metavar="J", help="jerk that sets the gains, m/s^3", show_default="the paper's signal's"),
+    ] = None,
     assignments: EncoderSetOption = None,
 ) -> None:
     if figure and signal:
@@ -57,26 +63,27 @@ def command(
     curves = figures.curves(figure) if wanted is None and figure else curves_of(wanted)
     known, recorded = _signals(list(dict.fromkeys(signal or ["paper"])))
     encoder = _encoder(assignments, encoder_phase_error)
-    if not known and (rates is not None or encoder or acceleration_max is not None):
+    bounds = {"acceleration_max_m_per_s2": acceleration_max, "jerk_max_m_per_s3": jerk_max}
+    of_all = {"backend": backend} | {name: bound for name, bound in bounds.items() if bound is not None}
+    if not known and (rates is not None or encoder or len(of_all) > 1):
         raise BadInput(
-            "--rates, --encoder-phase-error and --acceleration-max are for known motions, as is --set: a recording has "
-            "its own"
+            "--rates, --encoder-phase-error, --acceleration-max and --jerk-max are for known motions, as is --set: a "
+            "recording has its own"
         )
     if options.given and not recorded:
         hint = ": the rates of known motions are --rates" if options.rate is not None else ""
         raise BadInput(f"{', '.join(options.given)} must be absent without a recording{hint}")
     if acceleration_max is not None:
         within(acceleration_max, "--acceleration-max", *ACCELERATIONS_M_PER_S2, "m/s^2")
+    if jerk_max is not None:
+        within(jerk_max, "--jerk-max", *JERKS_M_PER_S3, "m/s^3")
     at = figures.RATES_HZ[figure or 2] if rates is None else rates_of(rates, "--rates")
     if options.plot and (recorded or len(known) > 1):
         raise BadInput("--plot draws error against rate for one signal that is no recording: give one --signal")
     if options.plot and figure == 1 and (len(at) > 1 or at[0] > DRAWN_HZ_MAX):
         raise BadInput(f"--figure 1 is drawn at one rate of at most {DRAWN_HZ_MAX:g} Hz, not {rates!r}")
-    of_all: dict[str, Any] = {"backend": backend}
     if encoder:
         of_all["encoder"] = encoder
-    if acceleration_max is not None:
-        of_all["acceleration_max_m_per_s2"] = acceleration_max
     run = partial(options.results, store=Store("accuracy"))
     try:
         errors_of(encoder)

@@ -51,6 +51,19 @@ def _small(error_mm_s: float) -> str:
     return number(error_mm_s, 2) if error_mm_s >= 1e-4 else "0"
 
 
+def frontier(*reports: Report) -> list[str]:
+    """Return the errors of estimators on the swing and at an impact, a row for each bound on the jerk."""
+    found = [_errors(report) for report in reports]
+    rows = [
+        [
+            number(report["rows"][0]["jerk_max_mm_s3"] / 1e3, 1),
+            *(f"{number(own['paper'], 2)} / {number(own['hit'], 2)}" for own in errors.values()),
+        ]
+        for report, errors in zip(reports, found, strict=True)
+    ]
+    return table(["jerk (m/s³); swing / impact (mm/s)", *found[0]], rows)
+
+
 def encoders(perfect: Report, late: Report, *misplaced: Report) -> list[str]:
     """Return the RMS errors with a perfect encoder, with edges that err, and with a channel out of phase.
 

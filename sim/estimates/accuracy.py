@@ -1,9 +1,9 @@
 """How accurate a velocity estimator is: known motions at any rate, on any backend, against the exact derivative.
 
-Gains are the estimator's defaults for the signal's own bound C on the acceleration, unless others are given; a bound on
-the jerk is the swing's for every signal. The clock is the slowest multiple of the rate that is at least 50 MHz and
-leaves 50 clocks a sample, enough for every estimator's path. Above 1 MHz the clock is faster than that of a real part,
-so the stamps are finer too. The row reports the clock.
+Gains are the estimator's defaults for the signal's own bound C on the acceleration, unless others are given; the bound
+on the jerk is the swing's for every signal, unless another is given. The clock is the slowest multiple of the rate that
+is at least 50 MHz and leaves 50 clocks a sample, enough for every estimator's path. Above 1 MHz the clock is faster
+than that of a real part, so the stamps are finer too. The row reports the clock.
 """
 
 import math
@@ -130,12 +130,13 @@ def spec_of(job: dict) -> AxisSpec:
     """
     known = signals.load(job["signal"])
     bound = job.get("acceleration_max_m_per_s2") or known.acceleration_max_m_per_s2
+    jerk = job.get("jerk_max_m_per_s3") or known.jerk_max_m_per_s3
     name, rate = job["estimator"], job["sample_hz"]
     encoder = job.get("encoder") or {}
     if LEARNED in encoder:
         learning.check(encoder[LEARNED], name, job.get("backend", "float"))
     try:
-        return axis_spec(name, rate, bound, job.get("gains"), job.get("bits_dropped", 0), known.jerk_max_m_per_s3)
+        return axis_spec(name, rate, bound, job.get("gains"), job.get("bits_dropped", 0), jerk)
     except ValueError as error:
         raise ValueError(f"{name} at {rate} Hz with C {bound:g} m/s^2: {error}") from None
 
@@ -162,6 +163,7 @@ def measure(
     backend: str = "float",
     encoder: dict[str, Any] | None = None,
     acceleration_max_m_per_s2: float | None = None,
+    jerk_max_m_per_s3: float | None = None,
     gains: dict[str, float] | None = None,
     bits_dropped: int = 0,
 ) -> dict:
@@ -174,6 +176,7 @@ def measure(
         backend: `float`, `fixed` or `rtl`.
         encoder: errors of the encoder, as for `errors_of`, and `LEARNED` for a map of its scale; None for none.
         acceleration_max_m_per_s2: C for the default gains; None for the signal's own.
+        jerk_max_m_per_s3: jerk for the default gains; None for the swing's.
         gains: gains to use instead, by the names of the estimator's `Gains`.
         bits_dropped: number of fraction bits taken from the estimator's words.
 
@@ -183,7 +186,8 @@ def measure(
     """
     known = signals.load(signal)
     job = {"estimator": estimator, "signal": signal, "sample_hz": sample_hz, "backend": backend, "encoder": encoder}
-    job |= {"acceleration_max_m_per_s2": acceleration_max_m_per_s2, "gains": gains, "bits_dropped": bits_dropped}
+    job |= {"acceleration_max_m_per_s2": acceleration_max_m_per_s2, "jerk_max_m_per_s3": jerk_max_m_per_s3}
+    job |= {"gains": gains, "bits_dropped": bits_dropped}
     spec = spec_of(job)
     begin = math.ceil(known.judged_from_s * sample_hz)
     judge, raised = judged(known, spec, output, backend, encoder)
@@ -203,6 +207,7 @@ def measure(
         "velocity_bits": spec.design.estimator.velocity.width,
         **_said_by_row(encoder or {}),
         "acceleration_max_mm_s2": spec.acceleration_max_m_per_s2 * 1e3,
+        "jerk_max_mm_s3": spec.jerk_bound_m_per_s3 * 1e3,
         "gains": asdict(spec.design.gains),
         "flags": spec.design.flag_names(raised),
     }

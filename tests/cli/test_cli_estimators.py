@@ -95,6 +95,11 @@ def test_figures_are_drawn(monkeypatch, capsys, tmp_path, figure):
         (["choose", "--set", "encoder.dead=a"], "mhz: encoder.dead_s is missing, which encoder.dead needs"),
         (["accuracy", "--acceleration-max", "0"], "--acceleration-max must be 1e-09 to 1e+06 m/s^2"),
         (["accuracy", "--acceleration-max", "nan"], "--acceleration-max must be 1e-09 to 1e+06 m/s^2"),
+        (["accuracy", "--jerk-max", "0"], "--jerk-max must be 1e-09 to 1e+12 m/s^3"),
+        (
+            ["accuracy", "--jerk-max", "1e-9", "--estimators", "levant-2", "--rates", "2e3"],
+            "levant-2 at 2000 Hz with C 1.67848 m/s^2: jerk_m_per_s3 must be 1.45519e-08 to 500 ",
+        ),
         (["accuracy", "--acceleration-max", "1e-9", *SHORT], "levant at 2000 Hz with C 1e-09 m/s^2: "),
         (["accuracy", "--signal", "none.csv:a:b", "--estimators", "fdm"], "none.csv: there is no such file"),
         (["accuracy", "--signal", "none.csv:counts", "--rates", "1e3"], "--rates, --encoder-phase-error and --acceler"),

@@ -94,6 +94,10 @@ def test_gains_follow_the_bound():
     assert given["gains"] == pytest.approx({"alpha_m_per_s2": 3.3, "lambda_sqrt_m_per_s": math.sqrt(3)})
     other = measure("levant", "u", "steady:10", 10_000, gains={"alpha_m_per_s2": 1.0, "lambda_sqrt_m_per_s": 2.0})
     assert other["gains"]["alpha_m_per_s2"] == 1.0
+    own, given = (measure("levant-2", "z1", "steady:10", 10_000, jerk_max_m_per_s3=j) for j in (None, 3e3))
+    assert own["gains"]["jerk_m_per_s3"] == pytest.approx(signals.load("steady:10").jerk_max_m_per_s3)
+    assert own["jerk_max_mm_s3"] == pytest.approx(own["gains"]["jerk_m_per_s3"] * 1e3)
+    assert given["gains"] == {"jerk_m_per_s3": 3e3}
 
 
 def test_the_clock_leaves_every_estimator_its_time():
