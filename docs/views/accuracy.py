@@ -3,6 +3,8 @@
 from statistics import median
 from typing import Any
 
+from hardwall.sim.studies.rendered_setting import rate_text
+
 from .tables import Report, number, of_starts, table
 
 Row = dict[str, Any]
@@ -49,6 +51,15 @@ def situations(report: Report) -> list[str]:
 def _small(error_mm_s: float) -> str:
     """Return an error; less than a ten-thousandth of a mm/s is none."""
     return number(error_mm_s, 2) if error_mm_s >= 1e-4 else "0"
+
+
+def by_rate(report: Report) -> list[str]:
+    """Return the RMS error of every estimator by the sample rate."""
+    rates = sorted({row["sample_hz"] for row in report["rows"]})
+    found = {(_name(row), row["sample_hz"]): row["rms_mm_s"] for row in report["rows"]}
+    names = dict.fromkeys(_name(row) for row in report["rows"])
+    rows = ([name, *(number(found[name, rate]) for rate in rates)] for name in names)
+    return table(["RMS error (mm/s)", *map(rate_text, rates)], rows)
 
 
 def frontier(*reports: Report) -> list[str]:

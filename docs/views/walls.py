@@ -89,6 +89,15 @@ def _friction(report: Report) -> str:
     return f"{changes['handle.coulomb_n']:g} N" if changes["handle.coulomb_n"] else "none"
 
 
+def jerks(*reports: Report) -> list[str]:
+    """Return the area of every method, a row for the bound on the jerk of each report."""
+    key = "controller.jerk_max_m_per_s3"
+    rows = [
+        [number(report["maps"][0]["changes"][key], 1), *(_area(each) for each in report["maps"])] for report in reports
+    ]
+    return table([f"jerk (m/s³); {AREA}", *(each["label"] for each in reports[0]["maps"])], rows)
+
+
 def hands(report: Report) -> list[str]:
     """Return the area of every method, a row for each hand on the handle, and one for the worst of them."""
     found: dict[str, dict[str, Map]] = {}

@@ -153,7 +153,9 @@ def _against_rate(axes: Axes, curves: Curves) -> None:
 def _message(errors: Curves, stiffest: Curves) -> str:
     """Return what the numbers say: whose error changes most with the rate, and where a plain low pass is better."""
     times = {name: points[-1].value / points[0].value for name, points in errors.items()}
-    worst, best = max(times, key=times.__getitem__), min(times, key=times.__getitem__)
+    # Of those whose walls are known, too.
+    both = [name for name in times if name in stiffest] or [*times]
+    worst, best = max(times, key=times.__getitem__), min(both, key=times.__getitem__)
     first, last = (rate_text(errors[worst][place].rate_hz) for place in (0, -1))
     wins = [_where(curves, best, lower) for curves, lower in ((errors, True), (stiffest, False))]
     return (

@@ -69,10 +69,10 @@ COLOURS = {
     "levant-semi-implicit": "#AA4499",
     "levant-implicit": "#882255",
     "levant-adaptive": "#332288",
-    "levant-2": "#E7298A",
+    "levant-2": "#F06292",
     "levant-3": "#7570B3",
     "levant-2-filtering": "#66A61E",
-    "levant-3-filtering": "#1B9E77",
+    "levant-3-filtering": "#C2185B",
     "window": "#CC79A7",
     "foaw": "#3FA7D6",
     "least-squares": "#1F4E79",
@@ -98,7 +98,7 @@ def looks(curves: Sequence[tuple[str, str]]) -> list[dict]:
         before = list(curves[:index]).count((estimator, output))
         white = FADED * after / (before + after) if after else 0.0
         colour = mpl.colors.to_hex((1 - white) * np.array(mpl.colors.to_rgb(ink(estimator))) + white)
-        second = output not in ("u", "end-fit")
+        second = output not in ("u", "z1", "end-fit")
         filled = {"mfc": "white", "ls": "--"} if second else {"mfc": colour, "ls": "-"}
         styles.append({"color": colour, "marker": MARKERS.get(estimator, OTHER["marker"]), "mec": colour} | filled)
     return styles
