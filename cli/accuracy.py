@@ -32,23 +32,32 @@ FILE = re.compile(
 @study("workers", "plot", *READING, kind=ReadingOptions)
 def command(
     options: ReadingOptions,
-    figure: Annotated[int | None, typer.Option(min=1, max=2, help="reproduce the founding paper's figure")] = None,
+    figure: Annotated[
+        int | None, typer.Option(min=1, max=2, help="reproduce Figure 1 or 2 of the founding paper")
+    ] = None,
     signal: Annotated[
         list[str] | None,
         typer.Option(
-            help="paper, sweep, stop, flicker, hit, steady:MM_PER_S, FILE:COLUMN of a recording, or FILE of a capture",
+            help="paper, sweep, stop, flicker, hit or steady:MM_PER_S; or a recording, FILE:COLUMN; or a capture, FILE",
             show_default="paper",
         ),
     ] = None,
     wanted: EstimatorsOption = None,
-    rates: Annotated[str | None, typer.Option(metavar="HZ,...", help="sample rates, e.g. 1e3,10e3,1e6")] = None,
+    rates: Annotated[
+        str | None,
+        typer.Option(metavar="HZ,...", help="sample rates, 1e3 to 1e7 Hz", show_default="1e3 to 1e7, 1-2-5 steps"),
+    ] = None,
     backend: BackendOption = "float",
     encoder_phase_error: Annotated[
-        float, typer.Option(metavar="COUNTS", help="delay of channel B, -0.95 to 0.95 counts")
+        float, typer.Option(metavar="COUNTS", help="phase error of channel B, -0.95 to 0.95 counts")
     ] = 0.0,
     acceleration_max: Annotated[
         float | None,
-        typer.Option(metavar="C", help="acceleration that sets the gains, m/s^2", show_default="the signal's own"),
+        typer.Option(
+            metavar="C",
+            help="bound on the acceleration, which sets the gains, 1e-9 to 1e6 m/s^2",
+            show_default="the signal's",
+        ),
     ] = None,
     assignments: EncoderSetOption = None,
 ) -> None:

@@ -30,15 +30,27 @@ def boards_beginning(incomplete: str) -> list[str]:
 @study("set_")
 def command(
     options: StudyOptions,
-    board: Annotated[str, typer.Argument(metavar="BOARD", help=", ".join(BOARDS), autocompletion=boards_beginning)],
+    board: Annotated[
+        str, typer.Argument(metavar="BOARD", help=f"the board: {', '.join(BOARDS)}", autocompletion=boards_beginning)
+    ],
     folder: Annotated[
-        str, typer.Option("-o", "--output-folder", metavar="DIR", help="folder for the files, new or written before")
+        str,
+        typer.Option(
+            "-o", "--output-folder", metavar="DIR", help="folder for the files: new, empty, or written by this command"
+        ),
     ],
     scene: SceneOfBoardArgument = None,
     estimator: EstimatorOption = None,
     axes: AxesOption = None,
-    seeds: Annotated[int, typer.Option(min=1, max=99, help="most placements until one reaches the clock")] = 5,
-    program: Annotated[Memory | None, typer.Option(help="put the bitstream into the board that is connected")] = None,
+    seeds: Annotated[
+        int,
+        typer.Option(
+            min=1, max=99, help="largest number of placements to try; the first that reaches the clock rate is taken"
+        ),
+    ] = 5,
+    program: Annotated[
+        Memory | None, typer.Option(help="load the bitstream into this memory of the connected board")
+    ] = None,
 ) -> None:
     on = board_named("board", board)
     if program and program not in on.loads:

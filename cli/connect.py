@@ -50,7 +50,9 @@ def command(
     baud: BaudOption = BAUD,
     identity: IdentityOption = None,
     pace: PaceOption = None,
-    registers: Annotated[bool, typer.Option("--registers", help="every register, too")] = False,
+    registers: Annotated[
+        bool, typer.Option("--registers", help="list every register, with its value, unit and range")
+    ] = False,
 ) -> None:
     with axis_at(port, baud, identity, pace) as axis:
         summary = _summary(port, axis)

@@ -20,7 +20,9 @@ def command(
     scenes: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="SCENE...", help=f"some of {', '.join(names())}, or .toml files", show_default="three devices"
+            metavar="SCENE...",
+            help=f"scenes: {', '.join(names())}, or .toml files",
+            show_default=", ".join(cutoff.SCENES),
         ),
     ] = None,
     starts: StartsOption = STARTS,

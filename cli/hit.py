@@ -31,13 +31,22 @@ def command(
     estimator: EstimatorOption = None,
     output: OutputOption = None,
     backend: BackendOption = "fixed",
-    stiffness: Annotated[float | None, typer.Option(help="stiffness of the wall, N/m")] = None,
-    damping: Annotated[float | None, typer.Option(help="damping of the wall, N s/m")] = None,
+    stiffness: Annotated[
+        float | None, typer.Option(help="stiffness of the wall, N/m", show_default="the scene's")
+    ] = None,
+    damping: Annotated[
+        float | None, typer.Option(help="damping of the wall, N s/m", show_default="the scene's")
+    ] = None,
     trace: Annotated[
-        Path | None, typer.Option(metavar="FILE", help=".npz: the samples; .fst: a waveform of the contact (rtl)")
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="write the samples into an .npz, or a waveform of the contact into an .fst (--backend rtl)",
+        ),
     ] = None,
     beside: Annotated[
-        str | None, typer.Option(metavar="SCENE", help="another scene to hit, too; --plot then takes .gif as well")
+        str | None,
+        typer.Option(metavar="SCENE", help="another scene, to hit beside the first; --plot then also takes a .gif"),
     ] = None,
 ) -> None:
     changes = options.changes(

@@ -49,23 +49,37 @@ class Place(NamedTuple):
 
 def command(
     port: Annotated[
-        str, typer.Argument(metavar="PORT|virtual", help="a port, as of `hardwall connect`; or a board in simulation")
+        str,
+        typer.Argument(
+            metavar="PORT|virtual", help="a port, as for `hardwall connect`; or `virtual`, a board in simulation"
+        ),
     ],
     scene: Annotated[
         str | None,
-        typer.Argument(metavar="SCENE", help="the scene of that", show_default=f"{SCENE}, with a clock of 4 MHz"),
+        typer.Argument(
+            metavar="SCENE", help="scene of the board in simulation", show_default=f"{SCENE}, with a clock of 4 MHz"
+        ),
     ] = None,
     estimator: EstimatorOption = None,
     set_: SetOption = None,
     baud: Annotated[
-        int | None, typer.Option(min=1, max=BAUD_MAX, help="the board's rate", show_default=f"{BAUD}")
+        int | None,
+        typer.Option(min=1, max=BAUD_MAX, help="baud rate of the board's serial line", show_default=f"{BAUD}"),
     ] = None,
     identity: IdentityOption = None,
     pace: PaceOption = None,
-    host: Annotated[str, typer.Option(metavar="ADDRESS", help="the address at which the page is served")] = LOCAL,
-    http: Annotated[int, typer.Option(min=0, max=65535, metavar="PORT", help="its port; 0 for any that is free")] = 0,
+    host: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="address of this machine at which the page is served")
+    ] = LOCAL,
+    http: Annotated[
+        int,
+        typer.Option(min=0, max=65535, metavar="PORT", help="port at which the page is served; 0 takes any free one"),
+    ] = 0,
     renew: Annotated[
-        bool, typer.Option("--new-token", help="give the page another address than the one that is kept for --http")
+        bool,
+        typer.Option(
+            "--new-token", help="replace the secret token in the page's address, which is kept for the port --http"
+        ),
     ] = False,
     seconds: SecondsOption = None,
 ) -> None:

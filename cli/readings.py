@@ -31,32 +31,51 @@ class ReadingOptions(StudyOptions):
         typer.Option(
             "--set",
             metavar="controller.KEY=VALUE",
-            help="gains.ESTIMATOR.NAME, jerk_max_counts_per_s3 or edge_error_max_counts, as a scene's in counts",
+            help="change gains.ESTIMATOR.NAME, jerk_max_counts_per_s3 or edge_error_max_counts, in counts, not m",
         ),
     ] = None
     rate: Annotated[
-        float | None, typer.Option(metavar="HZ", help="sample rate of a recording", show_default="from its times")
+        float | None, typer.Option(metavar="HZ", help="sample rate of a recording, Hz", show_default="from its times")
     ] = None
     time: Annotated[
         str | None,
-        typer.Option(metavar="COLUMN", help="column of times, or `none`", show_default="by its name"),
+        typer.Option(
+            metavar="COLUMN",
+            help="column of times, by name or number; `none`: the file has no times",
+            show_default="found by its name",
+        ),
     ] = None
     time_unit: Annotated[
-        Literal[(*TIME_UNITS, "iso")] | None, typer.Option(help="unit of the times", show_default="by name or rate")
+        Literal[(*TIME_UNITS, "iso")] | None,
+        typer.Option(help="unit of the times", show_default="found by the column's name or by --rate"),
     ] = None
-    unit: Annotated[Literal[UNITS], typer.Option(help="unit of the column")] = "counts"
+    unit: Annotated[Literal[UNITS], typer.Option(help="unit of the positions")] = "counts"
     count: Annotated[
         str | None,
-        typer.Option(metavar="SIZE", help="size of a count in that unit, e.g. 0.005, 360/40000 or 2pi/2048"),
+        typer.Option(metavar="SIZE", help="size of a count in the unit --unit, e.g. 0.005, 360/40000 or 2pi/2048"),
     ] = None
     counter_bits: Annotated[
         int | None,
-        typer.Option(min=COUNTER_BITS[0], max=COUNTER_BITS[1], help="width of the counter", show_default="found"),
+        typer.Option(
+            min=COUNTER_BITS[0],
+            max=COUNTER_BITS[1],
+            help="width of the counter that wraps, bits",
+            show_default="found by its jumps",
+        ),
     ] = None
-    gaps: Annotated[Literal[RULES], typer.Option(help="what becomes of missing samples")] = "refuse"
+    gaps: Annotated[
+        Literal[RULES],
+        typer.Option(
+            help="missing samples: refuse the recording, hold the count, or split there and take the longest piece"
+        ),
+    ] = "refuse"
     channels: Annotated[
         str | None,
-        typer.Option(metavar="A,B[,Z]", help="channels of a capture, by name or number", show_default="by their names"),
+        typer.Option(
+            metavar="A,B[,Z]",
+            help="channels of a logic analyser's capture, by name or number",
+            show_default="found by their names",
+        ),
     ] = None
 
     @property

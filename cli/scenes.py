@@ -26,7 +26,7 @@ def _scenes(incomplete: str) -> list[str]:
 
 def _scene_argument(kind: Any, default: bool | str) -> Any:
     """Return the type of the argument that names a scene, whose help says what stands for none."""
-    said = f"{', '.join(names())}, or a .toml file"
+    said = f"the scene: {', '.join(names())}, or a .toml file"
     argument = typer.Argument(metavar="SCENE", help=said, autocompletion=_scenes, show_default=default)
     return Annotated[kind, argument]
 
@@ -36,10 +36,12 @@ SceneOfBoardArgument = _scene_argument(str | None, "the board's own, at a clock 
 SceneOrOfBoardArgument = _scene_argument(
     str | None, "seed-2011; with --board the board's own, at a clock that it makes"
 )
-DeviceOption = Annotated[PartName, typer.Option(help="the part to place and route for")]
+DeviceOption = Annotated[PartName, typer.Option(help="FPGA to place and route for")]
 EncoderSetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="encoder.KEY=VALUE", help="give the encoder an error: a key of a scene's encoder"),
+    typer.Option(
+        "--set", metavar="encoder.KEY=VALUE", help="give the encoder an error, by a key of a scene's section [encoder]"
+    ),
 ]
 
 

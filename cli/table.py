@@ -55,7 +55,7 @@ class ReportOfAxes(BaseModel):
 
 
 def command(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE", help="JSON reports of `hardwall hit --json`")],
+    files: Annotated[list[Path], typer.Argument(metavar="FILE", help="reports that `hardwall hit --json` printed")],
 ) -> None:
     show(table_of(("run",), NUMBERS, [report.row() for file in files for report in _reports(file)]))
     for note in NOTES:
