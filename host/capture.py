@@ -23,14 +23,14 @@ PART_RECORDS = 15
 VALUES = "count", "velocity", "driven"
 """The status whose formats the values of a record have, in their order."""
 TAKEN = "capture_axis"
-"""The word of the axis that is captured, which a board of several axes has."""
+"""The word that selects the captured axis, on a board of several axes."""
 LOOK_S = 0.02
 """The time between two looks at the state of a capture."""
 
 
 @dataclass(frozen=True)
 class Captured:
-    """A capture: one element a record in every array, of which `place` are before the trigger.
+    """A capture. Every array has one element per record; `place` of the records are before the trigger.
 
     Attributes:
         time_s: time from the first record at the trigger or behind it, s.
@@ -100,7 +100,7 @@ class Board(Protocol):
 class Capture:
     """The capture memory of a board, for one of its axes.
 
-    Several axes have one memory, which takes the axis that was started last; for the others there is no capture then.
+    Several axes share one memory. It records the axis whose capture was started last; the others have none then.
 
     Args:
         board: the axis.
@@ -190,7 +190,7 @@ class Capture:
             self._board.sleep(LOOK_S)
 
     def read(self, progress: Callable[[int], object] = lambda done: None, lives: bool = True) -> Captured:
-        """Return a capture that is done; the errors are those of `reading`.
+        """Return a capture that is done. Errors: see `reading`.
 
         Args:
             progress: called with the number of records that are read.

@@ -100,7 +100,7 @@ class Config:
             part.write_text(HEAD + "\n".join(lines) + "\n", encoding="utf-8")
 
     def differences(self, axis: Axis) -> list[Difference]:
-        """Return the words that are not what the axis uses, in the order of the board's words.
+        """Return the words whose values differ from those in use, in the order of the board's words.
 
         Raises:
             ChangedError: if the file is of another board; the message says what differs.
@@ -174,7 +174,7 @@ class Config:
 
 
 def _undone(axis: Axis, before: dict[str, float], error: HostError) -> HostError:
-    """Write what a board had before; return an error that says whether it has it."""
+    """Write back the words that the board had before; return an error that says whether this succeeded."""
     with suppress(HostError):
         axis.set(**before)
         if all(axis.get(name) == value for name, value in before.items()):
@@ -187,7 +187,7 @@ def _facts(device: Device) -> dict[str, Any]:
 
 
 def _nearest(word: Register, value: float) -> float:
-    """Return the SI value with the fewest digits that is the same word; an int of a word that is a plain number."""
+    """Return the SI value of a word with as few digits as give the same word again; an int for a plain number."""
     number = round(value / word.lsb)
     if is_whole(word):
         return number

@@ -1,4 +1,4 @@
-"""What is asked of a board over its line: the bytes of request and answer, how it is sent, and what fits it."""
+"""Requests to a board over its line: their bytes, their answers, and the check that an answer fits."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
