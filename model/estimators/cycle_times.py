@@ -1,16 +1,16 @@
 """Times of whole encoder cycles from the clock stamps of their edges, exact to the stamps.
 
-The four edges of an encoder's cycle (A rise, B rise, A fall, B fall) may be out of place, each kind by its own error,
-but an edge is exactly 4 counts from the edge of its kind in the next cycle, so the time of a cycle is the time between
+The four edges of an encoder's cycle (A rise, B rise, A fall, B fall) may be out of place, each kind by its own error.
+But an edge is exactly 4 counts from the edge of its kind in the next cycle. So the time of a cycle is the time between
 two edges of one kind. `observe` subtracts, from the stamp of the last edge, the stamp of its kind at the previous
-sample. The difference spans a whole number of cycles only if all edges between went in one direction, as far as samples
-show: the direction did not change, and the decoder's run covers the counts between.
+sample. The difference spans a whole number of cycles only if all edges between went in one direction. Samples show this
+if the direction did not change and the decoder's run covers the counts between.
 
-A stamp wraps after 2**stamp_width clocks. An edge is forgotten in the last quarter of that time (after AGE_LIMIT of it:
-the two top bits of its age are set), so a sample must be no longer than that quarter; older edges cannot alias. At the
-first sample, and with a restart, all edges are forgotten: an edge is known once its stamp has changed since then. An
-illegal transition ends the run of known edges; if four more edges follow it within its sample, only the decoder's flag
-shows it.
+A stamp wraps after 2**stamp_width clocks. An edge is forgotten in the last quarter of that time: after AGE_LIMIT of it,
+when the two top bits of its age are set. So a sample must be at most as long as that quarter; older edges cannot alias.
+At the first sample, and with a restart, all edges are forgotten: an edge is known once its stamp has changed since
+then. An illegal transition ends the run of known edges; if four more edges follow it within its sample, only the
+decoder's flag shows it.
 
 Source: Brown, Schneider, Mulligan, IEEE Trans. Industrial Electronics 1992, fixed-position methods.
 """

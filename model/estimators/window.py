@@ -13,8 +13,8 @@ it: a constant half count, which adds no velocity, and eps = 1/2 count in either
 h counts has eps = (1 + h) / 2, where h is the largest difference of two displacements.
 
 Past counts come from `history`, which defines the behaviour during the first n samples, at a wrap of the count, and
-beyond the largest speed. If it stores only every M-th position, n is a multiple of M and v is held between: that adds
-at most c (M - 1) to the error, a fraction 1 / (n / M) of it or less, and n / M is a thousand or more.
+beyond the largest speed. If it stores only every M-th position, n is a multiple of M and v is held between. This adds
+at most c (M - 1) to the error: a fraction 1 / (n / M) of it or less, and n / M is a thousand or more.
 
 Formats, derived:
 
