@@ -66,7 +66,7 @@ class Motion:
     def of(
         cls, counts: np.ndarray, sample_hz: float, count: float = 1.0, **given: Any
     ) -> tuple[Self, dict[str, float]]:
-        """Return the bounds of a record; and by name those that were not given, so that the counts gave them.
+        """Return the bounds of a record; and, by name, the bounds taken from the counts.
 
         Args:
             counts: integers, shape (..., samples) with two samples or more; one set of bounds for all lanes.

@@ -18,7 +18,7 @@ from .stamped import run
 from .velocity_estimator import VelocityEstimator, check_of_counts, is_floating, output_of
 
 CLOCK_HZ, CLOCKS = 100e6, 1 << 16
-"""The lowest rate of the clock that stamps edges, Hz, and the most clocks of a sample for which it is kept."""
+"""The lowest rate of the stamping clock, Hz, unless a sample would then have more clocks than this number."""
 CLOCK_RANGE = 1e-6, 2.0**48
 BOUNDS = "speed_max", "travel", "jerk_max", "edge_error"
 """The bounds of a motion that are settings."""

@@ -45,7 +45,7 @@ def offset_of(register: Register) -> int:
 
 
 def _fields(registers: RegisterMap) -> Iterator[str]:
-    """Yield what C needs of the fields inside words: shifts of the bits that have masks, and fields of several bits."""
+    """Yield the C lines for fields inside words: shifts of the masked bits, and fields of several bits."""
     for kind, names in (
         ("CAUSE", [cause.name for cause in CAUSES]),
         ("FLAG", registers.spec.design.flags),

@@ -2,7 +2,8 @@
 
 Every axis equals a single one (`axis`) with its words, sample for sample. All sample at one rate, in turn: in a rota of
 `clocks_per_sample` clocks, clock i takes a sample of axis i. A rota has at least `slots` clocks: one for every axis,
-and no fewer than the recurrence, the clocks until what a sample leaves to the next one of its axis is kept.
+and no fewer than the recurrence. The recurrence is the clocks until the state that a sample leaves for the next sample
+of its axis is stored.
 
 The latency from a sample to its drive may exceed the rota: several samples of an axis are then under way at once.
 
@@ -75,8 +76,8 @@ class AxesSpec(DesignedAxis):
     Attributes:
         axes: the number of axes, 1 to `AXES_MAX`.
 
-    The other attributes are those of `designed.DesignedAxis`, and the errors those of `requirements.AxisRequirements`.
-    The estimator is one of `PIPELINES`; the words of an axis may say other gains.
+    The other attributes are in `designed.DesignedAxis`, the errors in `requirements.AxisRequirements`. The estimator is
+    one of `PIPELINES`; the words of an axis may say other gains.
     """
 
     axes: int

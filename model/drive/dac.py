@@ -41,8 +41,8 @@ class Stage(stage.Stage):
         coding: how a code is written.
         header_bits, header: the bits before the code, and their number.
         trailing_bits: the zeros behind it.
-        mode: of the SPI: 0 or 1 if the serial clock rests low, 2 or 3 if it rests high; a bit is taken at the first
-            edge of its period in the modes 0 and 2, at the second in 1 and 3.
+        mode: mode of the SPI. The serial clock rests low in the modes 0 and 1, high in 2 and 3. A bit is taken at the
+            first edge of its period in 0 and 2, at the second in 1 and 3.
         serial_hz: the highest frequency of the serial clock.
         setup: whole frames that go out first.
     """

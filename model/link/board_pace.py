@@ -1,7 +1,7 @@
 """The pace of a virtual board, which it tells its hosts beside the line: nothing in the board knows of it.
 
-Both ends meet at an abstract socket of this machine, whose name has the port in it. It is there as long as the process
-of the virtual board is, so that no board is taken for one that has gone; and a port without it has the pace 1.
+Both ends meet at an abstract socket of this machine, whose name has the port in it. The socket exists as long as the
+process of the virtual board, so no old socket tells a pace. A port without it has the pace 1.
 """
 
 import os
@@ -74,7 +74,7 @@ class Teller:
         self.close()
 
     def close(self) -> None:
-        """Leave all hosts, which keep to what they were told last."""
+        """Leave all hosts; they keep the last pace that they were told."""
         for each in (*self._listeners, *self._hosts):
             each.close()
 

@@ -6,7 +6,7 @@ from typing import Any
 
 
 def accepted(kind: Any, marks: tuple = ()) -> str:
-    """Return what a key of a type accepts, with the limits that are annotated."""
+    """Return the accepted values of a type in words, with its annotated limits."""
     origin, inner = typing.get_origin(kind), typing.get_args(kind)
     if origin is typing.Annotated:
         return accepted(inner[0], kind.__metadata__ + tuple(marks))
