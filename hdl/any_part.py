@@ -1,4 +1,5 @@
-"""The platform that Verilog is written for: no vendor's part, with attributes and files that tools of several read."""
+"""The platform for which Verilog is written: no vendor's part; its attributes and files suit the tools of several
+vendors."""
 
 import re
 from typing import IO
@@ -13,7 +14,8 @@ ADDED = "added/"
 
 
 class AnyPart:
-    """A platform of Amaranth without a part, whose synchronisers have the attributes that tools of several parts read.
+    """A platform of Amaranth without a part. Its synchronisers have the attributes that the tools of several vendors
+    read.
 
     Attributes:
         files: the texts that components have added, by name.

@@ -30,8 +30,8 @@ class Axes(wiring.Component):
 
     In a rota of `spec.clocks_per_sample` clocks, beginning with the first one after a reset, clock i takes the count of
     axis i; `latency` clocks later its drive has changed. Every axis equals a `hardwall.hdl.axis.axis.Axis` with its
-    words, sample for sample. An input of one bit for each axis has that of axis i in bit i; an output that is an
-    array has the word of axis i as element i.
+    words, sample for sample. Bit i of an input with one bit for each axis belongs to axis i. Element i of an output
+    array is the word of axis i.
 
     Parameters at run time: while `word_ready`, a clock with `word_write` puts `word_value` into the shadow of word
     `word_number` of axis `word_axis`; words are numbered as in `spec.design.words`. A pulse of an axis's `commit` makes
@@ -80,8 +80,7 @@ class Axes(wiring.Component):
     stepped, edge_down : Out(axes), edge_kind : Out(array), indexed : Out(axes)
         High for one clock with the count of a new edge; whether the last edge counted -1, and its kind; high for one
         clock with the count at an index.
-    strobe, strobe_axis : Out
-        High in a clock in which an axis is sampled, and which one.
+    strobe, strobe_axis : Out High in a clock in which an axis is sampled; and the number of this axis.
     estimated : Out(axes), velocity, saturated, estimated_count : Out
         High for one clock with a sample's velocity; the velocity, whether the estimator is saturated, and the count.
     illegal, overspeed, wrapped : Out(axes), illegal_count : Out(array)
@@ -207,7 +206,8 @@ class Axes(wiring.Component):
         return m
 
     def _words(self, pipe: Pipe, first: Value):
-        """Add shadow and words in use but those of the encoders; return the word of the axis in a stage, by its name.
+        """Add the shadow and the words in use, except the encoders'; return a function: the word of the axis in a
+        stage, by name.
 
         The words of a sample are read at its strobe, all at once, and go along with it.
         """

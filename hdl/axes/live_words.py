@@ -51,7 +51,7 @@ class LiveWords:
         self._taken[word.name] = stage + 1, taken.as_signed() if word.format.signed else taken
 
     def __call__(self, name: str, stage: int) -> Value:
-        """Return the word of the axis that is in a stage, which comes after the one in which it was taken."""
+        """Return the word of the axis in a stage; this stage comes after the one that took the word."""
         since, taken = self._taken[name]
         return self._pipe.later(taken, stage - since)
 

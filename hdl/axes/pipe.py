@@ -63,7 +63,7 @@ class Pipe:
         Args:
             name: what waits.
             pulses: a bit for every axis.
-            stage: the stage in which what waits is looked at.
+            stage: the stage that looks at the waiting events.
         """
         waiting = Signal(self.axes, name=f"waiting_{name}")
         self.m.d.sync += waiting.eq(pulses | (waiting & ~Cat(self.turns(stage))))
@@ -106,7 +106,7 @@ class Pipe:
 
 
 class Kept:
-    """A word for every axis, which one stage writes and another reads, in a memory that is read within the clock."""
+    """A word for every axis: one stage writes it, another reads it. The memory is read within the clock."""
 
     def __init__(self, pipe: Pipe, name: str, shape: Shape | int):
         self._pipe = pipe

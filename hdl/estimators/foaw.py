@@ -25,7 +25,8 @@ class Estimator(EstimatorBlock):
 
     Before the first sample the axis counts as having stood at its position, so velocity is 0 at the first sample.
 
-    Latency: `latency` clocks from `strobe` to `valid`: one a tap, and those of the division; the next `strobe` may come
+    Latency: `latency` clocks from `strobe` to `valid`: one a tap, and the clocks of the division; the next `strobe` may
+        come
     with `valid`.
 
     Rounding and overflow: the search is exact; the velocity rounds toward zero. The change of a sample is limited to

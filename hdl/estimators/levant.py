@@ -23,7 +23,7 @@ class Estimator(EstimatorBlock):
     Start: at the first sample, and with `restart`, x = count and u1 = 0, so u = 0: a start from rest has no transient.
 
     Latency: `latency` clocks from `strobe` to `valid`: one for the distance, one for its magnitude, and one for every
-    two bits of the root, beside which lambda is multiplied; the next `strobe` may come with `valid`.
+    two bits of the root; lambda is multiplied meanwhile. The next `strobe` may come with `valid`.
 
     Rounding and overflow: the root rounds down and half of its LSB is added back; u rounds half up; e, u and u1
     saturate, with flags. The count may wrap.

@@ -15,7 +15,7 @@ from .levant_edge_signals import Signals
 
 
 class Estimator(EstimatorBlock):
-    """Levant's differentiator on edges: the error is that of the place predicted for an edge when it comes.
+    """Levant's differentiator on edges: the error is taken at an edge, against the place predicted for it.
 
     Equation, at an edge T clocks and n edges after the last edge in use, with 2**(L-1) <= T < 2**L, in counts, samples
     and clocks:

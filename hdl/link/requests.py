@@ -1,4 +1,4 @@
-"""What a server asks of a register file, and what comes back."""
+"""The requests of a server to a register file, and the answers."""
 
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
