@@ -32,9 +32,7 @@ FILE = re.compile(
 @study("workers", "plot", *READING, kind=ReadingOptions)
 def command(
     options: ReadingOptions,
-    figure: Annotated[
-        int | None, typer.Option(min=1, max=2, help="reproduce Figure 1 or 2 of the founding paper")
-    ] = None,
+    figure: Annotated[int | None, typer.Option(min=1, max=2, help="reproduce this figure of the paper")] = None,
     signal: Annotated[
         list[str] | None,
         typer.Option(
@@ -43,21 +41,14 @@ def command(
         ),
     ] = None,
     wanted: EstimatorsOption = None,
-    rates: Annotated[
-        str | None,
-        typer.Option(metavar="HZ,...", help="sample rates, 1e3 to 1e7 Hz", show_default="1e3 to 1e7, 1-2-5 steps"),
-    ] = None,
+    rates: Annotated[str | None, typer.Option(metavar="HZ,...", help="sample rates, 1e3 to 1e7 Hz each")] = None,
     backend: BackendOption = "float",
     encoder_phase_error: Annotated[
         float, typer.Option(metavar="COUNTS", help="phase error of channel B, -0.95 to 0.95 counts")
     ] = 0.0,
     acceleration_max: Annotated[
         float | None,
-        typer.Option(
-            metavar="C",
-            help="bound on the acceleration, which sets the gains, 1e-9 to 1e6 m/s^2",
-            show_default="the signal's",
-        ),
+        typer.Option(metavar="C", help="bound that sets the gains, 1e-9 to 1e6 m/s^2", show_default="the signal's own"),
     ] = None,
     assignments: EncoderSetOption = None,
 ) -> None:

@@ -23,8 +23,8 @@ is the quieter output.
 - *Standstill and constant speed.* In the band |b| <= alpha, e+ = 0 and u1+ = (f - last f) - (last e): from the second
   successive sample within the band, both outputs are exactly the finite difference, without memory or rounding. In the
   band, therefore, fixed point and real numbers agree word for word. A constant count leads into the band from any
-  state, at every rate, and there u is exactly 0. Measured with C = 1.6785 m/s^2: from 30 mm/s after 32 ms, from 0.3 m/s
-  after 0.22 s (about 2 u / alpha; `levant` never).
+  state, at every rate, and there u is exactly 0. With C = 1.6785 m/s^2 it was measured after 32 ms from 30 mm/s, and
+  after 0.22 s from 0.3 m/s (about 2 u / alpha; `levant` never).
 - *Low rates.* If alpha is a count or more, the estimator is the finite difference, limited in acceleration: 0.42 mm/s
   RMS on the paper's signal at 1 kHz, where the explicit estimator has 1.95. There the lack of chatter does not make it
   better than the finite difference; and a larger C only makes it more similar.
