@@ -76,7 +76,7 @@ def board_named(option: str, name: str) -> Description:
 
 
 def scene_on(board: Description, changes: dict[str, Any], scene: str | None) -> Scene:
-    """Return the scene that a board is to run: its own, at a clock that it makes, if none is given."""
+    """Return the scene for a board: the given one, or the board's own, at a clock that the board can make."""
     return load(scene, changes) if scene is not None else load(board.scene, board.changes | changes)
 
 

@@ -22,7 +22,7 @@ from .terminal import log, progress
 
 DECIMATION_MAX = (1 << DECIMATION_BITS) - 1
 TRIGGER, HAND = "contact", "hand"
-"""The trigger unless another one is given; and that of a person, as soon as enough records are there before it."""
+"""The default trigger; and the trigger by hand, which comes as soon as enough records are there before it."""
 
 
 @dataclass(frozen=True)

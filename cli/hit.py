@@ -85,7 +85,7 @@ def _hit_axes(options: StudyOptions, scene: AxesScene, backend: str, trace: Path
 
 
 def _hit_beside(options: StudyOptions, scenes: tuple[Scene | AxesScene, ...], backend: str, trace: Path | None) -> None:
-    """Hit the walls of two scenes, whose result has a picture of its own, which may move."""
+    """Hit the walls of two scenes. The result has its own picture, still or in motion."""
     for each in scenes:
         if isinstance(each, AxesScene):
             raise BadInput(f"--beside puts hits of one axis side by side, and {each.name} has several")

@@ -11,7 +11,7 @@ from .scenes import GAINS, SceneArgument, refuse
 from .study import StudyOptions, study
 
 RECORD_MAX_S = 1e6
-"""The longest record on either side of the contact: that of the longest protocol."""
+"""The longest record on either side of the contact, s: as long as the longest protocol."""
 
 
 @study("set_", "plot")

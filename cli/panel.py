@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 VIRTUAL = "virtual"
 """The word for a board in simulation."""
 SCENE = "seed-2011"
-"""The scene of such a board, which then has a clock at which it runs at about the pace of the real one."""
+"""The default scene of a board in simulation, with a clock at which it runs at about real speed."""
 
 
 class Place(NamedTuple):

@@ -1,4 +1,4 @@
-"""What the commands that speak to a board share: their options, its axis, and its errors."""
+"""The common part of the commands for a board: options, its axis, and its errors."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

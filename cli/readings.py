@@ -1,4 +1,4 @@
-"""The options that say how a recording is to be read, which `replay` and `accuracy` share."""
+"""The options for reading a recording, shared by `replay` and `accuracy`."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +24,7 @@ CHANNELS = 2, 3
 
 @dataclass(frozen=True, kw_only=True)
 class ReadingOptions(StudyOptions):
-    """The options of a recording; those of a study come with them, with the keys of a replay in place of a scene's."""
+    """The options of a recording and of a study; `--set` takes the keys of a replay instead of a scene's."""
 
     set_: Annotated[
         list[str] | None,
@@ -124,7 +124,7 @@ class ReadingOptions(StudyOptions):
 
 
 def say(recorded: Recording) -> None:
-    """Say on stderr what was understood of a file: with the result, for what is refused is one line alone."""
+    """Print on stderr how a file was read. It comes with the result, because a refusal is one line alone."""
     said = f"{Path(recorded.file).name}: {'; '.join(recorded.notes)}"
     log.print(one_line(said), style="dim", soft_wrap=True)
 
@@ -134,7 +134,7 @@ READING = "rate", "time", "time_unit", "unit", "count", "counter_bits", "gaps", 
 
 
 def _size(file: str | Path) -> int:
-    """Return the size of a file, bytes; 1 for one that is not there, which is said when it is read."""
+    """Return the size of a file, bytes; 1 for a missing file, which is reported when it is read."""
     try:
         return max(Path(file).stat().st_size, 1)
     except OSError:

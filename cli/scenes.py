@@ -1,4 +1,4 @@
-"""The options that say which scene, and what of it is changed or measured; and the checks of their values."""
+"""The options that choose a scene, its changes and what is measured; and the checks of their values."""
 
 import re
 from typing import Annotated, Any, Literal
@@ -25,7 +25,7 @@ def _scenes(incomplete: str) -> list[str]:
 
 
 def _scene_argument(kind: Any, default: bool | str) -> Any:
-    """Return the type of the argument that names a scene, whose help says what stands for none."""
+    """Return the type of the argument for a scene; its help names the default."""
     said = f"the scene: {', '.join(names())}, or a .toml file"
     argument = typer.Argument(metavar="SCENE", help=said, autocompletion=_scenes, show_default=default)
     return Annotated[kind, argument]

@@ -1,4 +1,5 @@
-"""The standard streams of the command line: what stdout cannot take is an error, and what stderr cannot is lost."""
+"""The standard streams of the command line. A failed write to stdout is an error; a failed write to stderr is
+ignored."""
 
 import errno
 import io
@@ -6,7 +7,7 @@ import os
 import sys
 
 CLOSED = 141
-"""The exit code if nobody reads stdout any more: that of a process that SIGPIPE ends."""
+"""The exit code if nobody reads stdout any more, as of a process ended by SIGPIPE."""
 
 
 class StdoutError(RuntimeError):

@@ -22,7 +22,7 @@ Name = Annotated[str, Field(max_length=200)]
 
 
 class Report(BaseModel):
-    """What the table takes of a report of `hardwall hit`, which `sim.walls.hit.Hit.report` makes."""
+    """The part of a report of `hardwall hit` that the table needs; `sim.walls.hit.Hit.report` makes the report."""
 
     model_config = ConfigDict(strict=True)
 
@@ -71,7 +71,7 @@ def _has_rows(content: bytes) -> bool:
 
 
 def _reports(file: Path) -> list[Report]:
-    """Return the report in a file, or those of several axes."""
+    """Return the report in a file, or the reports of several axes."""
     try:
         content = content_of(file, BYTES_MAX)
         if _has_rows(content):

@@ -93,7 +93,8 @@ def command(
 
 @contextmanager
 def _objects(samples: Samples, identity: str) -> Iterator[Callable[[Sample], object]]:
-    """Yield what prints a sample as an object; the last object says what was missed, however this ends."""
+    """Yield a function that prints a sample as an object. However this ends, the last object tells the missed
+    samples."""
     ended: list[bool] = []
 
     def end(write: Callable[[str], object]) -> None:

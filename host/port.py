@@ -147,7 +147,7 @@ class Port:
         """Write successive registers, all in one request.
 
         Args:
-            address: that of the first.
+            address: the first one's.
             registers: their words.
             sending: how the request goes out.
 

@@ -17,7 +17,7 @@ KEPT = 256
 
 
 class _Lane:
-    """An axis that goes on from record to record, with words that may change between two."""
+    """An axis that continues from record to record; its words may change in between."""
 
     def __init__(self, spec: AxisSpec):
         self.spec = spec
@@ -92,7 +92,7 @@ class Estimates:
             self._records.append(rows.astype("<f4").tobytes())
 
     def since(self, number: int) -> tuple[int, list[bytes]]:
-        """Return the number of the next record, and those from `number` on that are kept.
+        """Return the number of the next record, and the kept records from `number` on.
 
         A record is four successive rows of float32, of one length: the velocities (m/s) of both estimators, then the
         forces (N).

@@ -82,7 +82,7 @@ class Recorder:
         return decimation.low * shortest, decimation.high * shortest
 
     def begin(self, axis: Axis, wish: Wish) -> None:
-        """Begin a capture, whatever was before; the errors are those of `Capture.start`."""
+        """Begin a capture, whatever was before. Errors: see `Capture.start`."""
         least_s, most_s = self.spans_s(axis)
         check_range("span_s", wish.span_s, 0.0, most_s)
         records = axis.capture.records

@@ -24,7 +24,7 @@ BITS = 128
 FORM = re.compile(r"[A-Za-z0-9_-]{22}")
 """What a token of so many bits looks like."""
 OTHERS, OTHERS_WRITE = 0o077, 0o022
-"""The bits of a mode by which others may do anything, and those by which they may write."""
+"""The mode bits that give others any access, and the mode bits that let others write."""
 
 
 class Token(NamedTuple):
@@ -33,7 +33,7 @@ class Token(NamedTuple):
     Attributes:
         text: the token.
         file: where it is kept for the next start; None if it is of this start only.
-        note: why it is not kept, or not the one that was kept; empty if it is as expected.
+        note: why it is not kept, or is not the kept one; empty if it is as expected.
     """
 
     text: str
@@ -65,7 +65,7 @@ def is_of_this_machine(address: str) -> bool:
 
 
 def kept_token(port: int, renew: bool = False) -> Token:
-    """Return the token that is kept for a port, or a new one that is kept from now on.
+    """Return the token kept for a port, or a new one, kept from now on.
 
     A folder that cannot be had, or is not the user's alone, is no error: the token is of this start only, and `note`
     says why.

@@ -9,8 +9,8 @@ from .pll import MHZ, Ehxplll, Pll, Range, Rpll, SbPll40Pad
 class Part:
     """The commands and names for synthesis on a part, an FPGA of one kind.
 
-    In a command `{pins}` stands for the file of pins, `{routed}` for what nextpnr writes, `{bitstream}` for what the
-    packer writes, and `{unpacked}` for what is read back from that.
+    A command has four place-holders: `{pins}` is the file of pins, `{routed}` the output of nextpnr, `{bitstream}` the
+    output of the packer, and `{unpacked}` the unpacked bitstream.
 
     Attributes:
         synth: the Yosys command.
@@ -21,7 +21,7 @@ class Part:
         code: what a bitstream says of the part that it is for.
         oscillator: Verilog that drives the wire `oscillator` from the part's internal oscillator.
         pll: the part's PLL.
-        counted: for every resource, the names in nextpnr's report that share its places; the first is that of a place.
+        counted: for every resource, the names in nextpnr's report that share its places; the first name is a place's.
         flip_flops: the beginning of the names of flip-flop cells.
         cells: for a netlist that is not placed, the number of units of every resource in a cell of each type.
         multiplier_ns: longest delay through a multiplier block without registers, if nextpnr does not know it.

@@ -1,8 +1,8 @@
 """The PLLs of the parts: which clocks they make from a board's oscillator, and the Verilog that makes one.
 
-A clock is made exactly or not at all: every gain of an axis has its frequency in it. The ranges are those of the
-vendors' data sheets, which `docs/reference/boards.md` cites. Of several ways to make a clock, the one is taken whose
-phase detector is the fastest, and then the one whose oscillator (VCO) is nearest to the middle of its range.
+A clock is made exactly or not at all: every gain of an axis has its frequency in it. The ranges come from the vendors'
+data sheets, cited in `docs/reference/boards.md`. Among several ways to make a clock, the one with the fastest phase
+detector is taken, then the one with the oscillator (VCO) nearest to the middle of its range.
 """
 
 from abc import ABC, abstractmethod
@@ -20,7 +20,7 @@ NEAREST = 4
 
 
 class ClockError(FieldError):
-    """A clock that a board cannot make; one line that names the nearest that it can."""
+    """A board cannot make this clock; the one line of the message names the nearest possible clock."""
 
 
 class Range(NamedTuple):

@@ -71,7 +71,7 @@ USUAL = "pdm"
 OF_AXIS = "encoder_a", "encoder_b", "encoder_z", "alive", "drive_pdm", "drive_sign"
 """The signals that each of several axes has."""
 SHARED_LOOPS = "drive_enable", "external_fault", "emergency_stop"
-"""The loops, of which there is one set for all axes."""
+"""The loops; all axes share one set."""
 EVERY = (*_BEFORE, *(signal for signals in OF_STAGE.values() for signal in signals), *_BEHIND)
 """All signals that any board of ours has."""
 
@@ -82,7 +82,7 @@ def signals_of(stage: str) -> tuple[Signal, ...]:
 
 
 def signals_of_axes(axes: int) -> tuple[Signal, ...]:
-    """Return the signals of a board with several axes, those of an axis with its number at the end."""
+    """Return the signals of a board with several axes; an axis's signals end in its number."""
     alone = {signal.name: signal for signal in signals_of(USUAL)}
     theirs = [replace(alone[name], name=f"{name}_{axis}") for axis in range(axes) for name in OF_AXIS]
     once = [alone[name] for name in ("clk", "rst", *SHARED_LOOPS)]

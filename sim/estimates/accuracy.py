@@ -2,8 +2,8 @@
 
 Gains are the estimator's defaults for the signal's own bound C on the acceleration, unless others are given; a bound on
 the jerk is the swing's for every signal. The clock is the slowest multiple of the rate that is at least 50 MHz and
-leaves 50 clocks a sample, enough for every estimator's path. Above 1 MHz the clock is faster than that of a real part,
-so the stamps are finer too. The row reports the clock.
+leaves 50 clocks a sample, enough for every estimator's path. Above 1 MHz the clock is faster than a real part's, so the
+stamps are finer too. The row reports the clock.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Training passes of an encoder, and the map of its scale that they give: swings by hand, seen by their edges alone.
 
-A pass is a swing from the middle of the scale: amplitude, decay, frequency and direction are drawn by the encoder's
-seed and the number of the pass, and the jitter is that of another time. All that is taken of it are the edges that the
+A pass is a swing from the middle of the scale. The encoder's seed and the number of the pass determine amplitude,
+decay, frequency and direction. The jitter is drawn anew for each pass. All that is taken of it are the edges that the
 axis decodes, with their stamps; the count is referenced at the start, as by homing.
 """
 

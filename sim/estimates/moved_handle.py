@@ -1,7 +1,7 @@
 """A handle that is moved along a known path, whatever pushes it, and the force with which the wall of a scene answers.
 
-The encoder's edges, the decoder's time, the clocks up to the changed drive, the hold until the next one, an amplifier's
-delay and the steps of a converter are those of the closed loop. What is behind them is left out: an amplifier's lag, a
+As in the closed loop are: the encoder's edges, the decoder's time, the clocks up to the changed drive, the hold until
+the next one, an amplifier's delay and the steps of a converter. What is behind them is left out: an amplifier's lag, a
 motor, a cable, and a carrier's pulses about their mean; and handle and hand, for the path is given.
 """
 
@@ -37,7 +37,7 @@ def check(moved: str, *quantities: tuple[str, float, float, float, str]) -> None
 
 @compiled
 def _drives(controller, state, timing, edges, drives):
-    """Fill `drives` with those of the samples from the first on; return the state."""
+    """Fill `drives` from the first sample on; return the state."""
     taken = 0
     for k in range(len(drives)):
         state, taken = take(controller, state, timing, edges, taken, k)

@@ -79,7 +79,7 @@ def settings_of(changes: Mapping[str, Any], estimator: str) -> Settings:
 
 
 def names_of(estimator: str) -> dict[str, str]:
-    """Return the gains of an estimator: the names that they have here, and those of its class."""
+    """Return the gains of an estimator: their names here, and their names in its class."""
     return {in_counts(name): name for name in registry.design_of(estimator).gains_class.__annotations__}
 
 

@@ -25,7 +25,7 @@ _living: dict["Group", int] = {}
 
 
 class Group:
-    """A context with a process group, all of which is killed at the end of the context or of this process.
+    """A context with a process group: the end of the context, or of this process, kills the whole group.
 
     Attributes:
         number: the number of the group, while the context lasts.

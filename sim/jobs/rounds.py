@@ -13,7 +13,7 @@ def medians(
     """Return the median over the rounds of every contestant's results.
 
     Args:
-        contestants: functions by name, each of which returns one result.
+        contestants: functions by name; each returns one result.
         rounds: number of runs of every contestant.
         progress: called with a text that names the next run.
     """

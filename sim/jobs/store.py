@@ -2,9 +2,9 @@
 
 A store is a file of one JSON line for each result: a digest of the rest of the line, a digest of the job, by which the
 result is found, and the result. It belongs to the exact sources of this project and the versions of its tools: any
-change begins a new store. The line break comes before the text of a line, so that a part of a line, left by a process
-that was killed while it wrote, spoils no other line. A line that does not fit its digest is skipped, and its result
-computed again.
+change begins a new store. The line break comes before the text of a line. So a part of a line, left by a process that
+was killed while it wrote, spoils no other line. A line that does not fit its digest is skipped, and its result computed
+again.
 
 The digest says what this process runs only while its sources are what they were when it began. If one is written
 meanwhile, nothing is taken from a store any more, nothing is kept, and a warning says so.

@@ -134,7 +134,7 @@ def dialect_of(lines: Sequence[str]) -> Dialect | None:
 
 
 def _separator(rows: list[str]) -> str:
-    """Return the separator of the first rows, the first of which may name the columns."""
+    """Return the separator of the first rows; the very first may name the columns."""
     # Spaces behind another separator are no separators of their own.
     bare = re.sub(r"([,;])[ \t]+", r"\1", re.sub(r'"[^"]*"', "q", rows[0]).strip())
     found = next((mark for mark in "\t;," if mark in bare), None)

@@ -17,7 +17,7 @@ ACCEPTED = (
 
 
 class RecordingError(ValueError):
-    """A recording that is refused: one line that names the file, the place in it, and what is accepted."""
+    """A recording is refused. The message is one line: the file, the place in it, and the accepted values."""
 
 
 def plain(text: str) -> str:

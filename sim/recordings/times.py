@@ -160,7 +160,7 @@ class Sampled:
         )
 
     def _cure(self, rate_hz: float, given: bool) -> str:
-        """Return what helps against intervals that are not those of a rate."""
+        """Return the remedy for intervals that do not fit a rate."""
         unit, steps = self._times.resolution, self._steps / np.diff(self._numbers)
         if (passed_in(steps, unit, rate_hz if given else None) > 1).any():
             return (

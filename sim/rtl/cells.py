@@ -1,7 +1,7 @@
 """Simulation models of the cells that Yosys has none of: multipliers and block memories, in the modes that are mapped.
 
 A model ends the simulation if its cell is used otherwise: with a register, a reset, or ports of two widths. The ports
-and the places of a memory's bits are those of Yosys's own techmaps; the tests hold each model to the Verilog of a
+and the places of a memory's bits are as in Yosys's own techmaps. The tests compare each model with the Verilog of a
 product and of memories.
 
 What a data sheet leaves open is as bad as can be. A memory's output is anything at power-up, and where a port reads
@@ -20,7 +20,7 @@ def _bits(name: str, width: int) -> str:
 
 
 def _multiplier(width: int, a: str, b: str, signs: tuple[str, str], product: str) -> str:
-    """Return the assignment of a product: modulo twice the width, it is that of the extended operands."""
+    """Return the assignment of a product: modulo twice the width it equals the product of the extended operands."""
     extended = (
         f"{{{{{width}{{{word}[{width - 1}] & {sign}}}}}, {word}}}" for word, sign in zip((a, b), signs, strict=True)
     )

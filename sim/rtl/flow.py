@@ -38,8 +38,8 @@ class DoesNotFitError(SynthesisError):
     """A part has fewer cells than a board needs.
 
     Attributes:
-        lacking: the cells in use and those of the part, of each resource of which there are too few: lut4, dsp, bram;
-            of all where the placer found no room though there are enough by number.
+        lacking: (used, available) of each resource that is too small: lut4, dsp, bram. If the placer found no room
+            though the numbers suffice, of all resources.
     """
 
     def __init__(self, device: str, lacking: dict[str, tuple[int, int]]):
@@ -195,8 +195,8 @@ def report_of(placed: Path) -> dict:
 
 
 def _lacking(part: Part, log: str) -> dict[str, tuple[int, int]]:
-    """Return the cells in use and those of the part, of what a log of nextpnr says that there are too few: of all, if
-    it found no place for them.
+    """Return (used, available) of each resource that is too small, by nextpnr's log; of all resources if no placement
+    was found.
     """
     cells = {kind: (int(used), int(most)) for kind, used, most in re.findall(r"(\w+): +(\d+)/ *(\d+) +\d+%", log)}
     found = {name: cells[kinds[0]] for name, kinds in part.counted.items() if kinds[0] in cells}

@@ -20,8 +20,8 @@ CONSTANT = {"0" * 16, "1" * 16}
 UNTOLD_ECP5 = re.compile(
     r"\w+_SLICE|\w+_PIO|\w*(BOUNCE|JMUIA\d+|JPADDI|JREFCLK\d_\d|(BNK_|G_J|SYNC)ECLK\d|CLKINTFB|DDRDEL)"
 )
-"""Sources of wires of an ECP5 that are not compared. They have no bits, for they are connected unless another one is;
-but for outputs of logic cells, some of whose bits their mode sets, too, and edge clocks, which are not used."""
+"""Sources of wires of an ECP5 that are not compared. They have no bits: they are connected unless another wire is.
+Exceptions are outputs of logic cells, some of whose bits their mode sets too, and edge clocks, which are not used."""
 UNTOLD_GOWIN = re.compile(r"XD\d|GT00")
 """Wires of a Gowin that cannot be told: from a logic cell to its flip-flop there is no switch, and where clocks are
 tapped, four spines have the same bits."""
@@ -35,7 +35,7 @@ WIRE = "wire "
 
 
 def check(board: Description, routed: Path, unpacked: Path, bitstream: Path) -> int:
-    """Compare what was placed and routed with what a bitstream has; return the number of facts that are the same.
+    """Compare the placed and routed design with the bitstream's content; return the number of equal facts.
 
     Args:
         board: the board.
@@ -127,7 +127,7 @@ def _routed_json(path: Path) -> Facts:
 
 
 def wire_of(row: int, column: int, wire: str) -> str:
-    """Return the unpacker's name of a wire of a Gowin at a place: one that leads there has that of where it begins.
+    """Return the unpacker's name of a Gowin wire at a place; a wire that leads there is named after its beginning.
 
     Args:
         row, column: the place, from 1 on.

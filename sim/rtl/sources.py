@@ -60,7 +60,7 @@ def write_verilog(spec: AxisSpec | AxesSpec, folder: Path, beside: Mapping[str, 
 
 
 def _check_tops(folder: Path, spec: AxisSpec | AxesSpec, replaced: set[str]) -> None:
-    """Raise OtherTopError if a folder has a `top` for another clock or drive than those of `board.v`, and it stays."""
+    """Raise OtherTopError if a folder keeps a `top` for another clock or drive than `board.v` has."""
     drive = drive_of_axes(spec.axes) if isinstance(spec, AxesSpec) else spec.stage.name
     for path in sorted(path for path in folder.iterdir() if path.suffix.lower() in VERILOG and path.is_file()):
         with path.open(encoding="utf-8", errors="replace") as file:

@@ -1,4 +1,4 @@
-"""The tools that make a bitstream, from the Python package index, and the one that loads it."""
+"""The tools that make a bitstream, and the tool that loads it, all from the Python package index."""
 
 import os
 import re

@@ -15,7 +15,7 @@ __all__ = ["SceneError", "spec"]
 
 
 def spec(scene: str | Path) -> AxisSpec:
-    """Return the specification of the axis of a scene: that of its Verilog, gains included.
+    """Return the specification of the axis of a scene, as its Verilog has it, gains included.
 
         spec("mhz")         # as `hardwall verilog mhz` generates it
 

@@ -167,9 +167,9 @@ def tool_of(scene: Scene, backend: str) -> Tool:
 def sweep_of(scene: Scene, world: World, controller: object) -> Sweep | None:
     """Return what the loop needs to sweep over samples; None if it cannot: see `sim.loop.sweep`.
 
-    Only a model can be given a count, a rigid handle alone has a motion of one sign, the estimator must not look at
-    stamps, and the pins must be those of the handle's place. The edges before a changed drive must be counted at the
-    strobe after the next.
+    Four conditions hold: only a model can be given a count; only a rigid handle has a motion of one sign; the estimator
+    must not use stamps; and the pins must follow the handle's place. The edges before a changed drive must be counted
+    at the strobe after the next.
     """
     spec, timing = scene.spec, world.timing
     if not isinstance(controller, Controller) or not isinstance(world.plant, Rigid):

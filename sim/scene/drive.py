@@ -25,8 +25,8 @@ OF_A_DAC = "dac_"
 class DriveSection(Section):
     """The drive stage of the scene's board, and what makes newtons of its output: see `hardwall.model.drive`.
 
-    The amplifier is given either by its keys of volts or by those of amperes. Without this section a board has pulses,
-    whose full density is that of the drive's format.
+    The amplifier is described either in volts or in amperes. Without this section a board has pulses; their full
+    density stands for the drive format's full scale.
     """
 
     stage: Literal[tuple(STAGES)]

@@ -1,8 +1,7 @@
 """The section `encoder` of a scene: its scale, the errors of its edges, and what happens on its lines.
 
-Errors of place are in counts. Whatever moves edges is also summed up as the one number that the decoder's limits take:
-how far edges are moved against their neighbours (`error_counts`), and by jitter at a rate of edges
-(`error_counts_at`).
+Errors of place are in counts. All displacements of edges are also summed up in one number for the decoder's limits: the
+displacement against neighbouring edges (`error_counts`), and by jitter at a rate of edges (`error_counts_at`).
 """
 
 import math
@@ -123,7 +122,7 @@ class EncoderSection(Section):
 
     @property
     def depends_on_the_way(self) -> bool:
-        """Whether the pins are not those of the handle's place: hysteresis and whatever acts in time."""
+        """Whether the pins differ from the handle's place: by hysteresis, or by effects in time."""
         return self.hysteresis_counts > 0 or self.errors.lines is not None
 
     @cached_property

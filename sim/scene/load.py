@@ -120,7 +120,7 @@ def made(scene: str, content: dict[str, Any], make: Callable[[dict[str, Any]], A
 
 
 def _of_the_wall(content: dict[str, Any], error: ValidationError, make: Callable) -> str | None:
-    """Return what is wrong with a wall, by the range of the scene's controller, narrower than that of its keys.
+    """Return the fault of a wall, by the range of the scene's controller, which is narrower than the range of the keys.
 
     None if something else is wrong with the scene, or the wall is none of numbers.
     """

@@ -1,7 +1,7 @@
 """The quantities of a scene, each a type with the range that is accepted.
 
 `tests/scene/test_quantities.py` runs the loop at both ends of every range. The ranges are wide enough for any device
-that a hand touches, and narrow enough that no sum or product of such numbers leaves the range of float64.
+that a hand touches. They are narrow enough that no sum or product of such numbers leaves the range of float64.
 """
 
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
@@ -42,7 +42,7 @@ def rounded_up(limit: float) -> str:
 
 
 def or_none(quantity: Any) -> Any:
-    """Return the type of a number that may also be 0, which stands for a part or an effect that is absent."""
+    """Return the type of a number that may also be 0: the part or effect is then absent."""
     (limits,) = quantity.__metadata__
     return number(0.0, next(mark.le for mark in limits.metadata if hasattr(mark, "le")))
 

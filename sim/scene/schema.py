@@ -101,8 +101,8 @@ class WallSection(Section):
 
 
 class PassivitySection(Section):
-    """An observer of the energy that the drive gives, and a controller that damps by this much at most while it has
-    given more than it has taken: see `hardwall.model.axis.passivity`."""
+    """An observer of the energy that the drive gives to the handle, and a controller that damps by at most this much
+    while more energy was given than taken: see `hardwall.model.axis.passivity`."""
 
     damping_n_s_per_m: or_none(Damping)
 
@@ -135,7 +135,7 @@ class OutputSection(Section):
 
 
 class SolverSection(Section):
-    """Steps of semi-implicit Euler, no longer than `step_s`, as in most simulations; without this section the device is
+    """Steps of semi-implicit Euler of at most `step_s`, as in most simulations. Without this section the device is
     advanced exactly from event to event."""
 
     step_s: Step
@@ -150,8 +150,8 @@ class ProtocolSection(Section):
 
     `hardwall.sim.walls.hit_statistics` has what is said.
 
-    The place in the count of `start_m` and the phase of the push in a period of the force are those of one start among
-    many that differ by chance alone: see `hardwall.sim.walls.starts`.
+    `start_m` and the phase of the push are one start among many that differ by chance alone: the place within a count,
+    and the phase in a period of the force. See `hardwall.sim.walls.starts`.
     """
 
     start_m: Annotated[Place, Field(le=-1e-12)]
@@ -226,7 +226,7 @@ class Scene(Section):
 
     @property
     def felt_n_per_m(self) -> float:
-        """The stiffness that is felt at rest: the wall's, or that of wall and coupling one behind the other."""
+        """The stiffness felt at rest: the wall's, or of wall and coupling in series."""
         wall = self.wall.stiffness_n_per_m
         if self.coupling is None:
             return wall

@@ -35,7 +35,7 @@ def listed(kind: Any) -> type[BaseModel] | None:
 
 
 def written(key: tuple[str | int, ...]) -> str:
-    """Return a key by its parts, of which numbers are places in lists, as `encoder.cycles[0].edges`."""
+    """Return a key from its parts; numbers are places in lists, as in `encoder.cycles[0].edges`."""
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in key).removeprefix(".")
 
 

@@ -116,7 +116,7 @@ def _check_own(scene: str, name: str, key: tuple[str, ...]) -> None:
 
 
 def _change(scene: str, content: Content, tables: dict[str, Content], changes: dict[str, Any]) -> None:
-    """Put changes where they belong: those of single axes into their tables, the others in place of what tables say."""
+    """Apply changes: a change of a single axis goes into its table, any other replaces the keys of all tables."""
     of_all = {key: value for key, value in changes.items() if key.split(".")[0] != AXIS}
     for key, value in of_all.items():
         parts = key.split(".")

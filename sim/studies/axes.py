@@ -10,7 +10,7 @@ from ..scene.load import load
 
 DEVICE = "ecp5-25k"
 SCENE = "mhz"
-"""The formats are those of its axis."""
+"""It has the formats of its axis."""
 CLOCK_HZ = 96_000_000
 """The clock that is asked for; the placer works as hard as it must for it."""
 NUMBERS = (1, 2, 4, 8, 16, 32)

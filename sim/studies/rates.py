@@ -40,7 +40,7 @@ GAINED = 0.95
 
 
 def at_rate(rate_hz: int) -> dict[str, Any]:
-    """Return the changes of a scene for a rate; the force has no delay but that of its own path."""
+    """Return the changes of a scene for a rate; the force has only the delay of its own path."""
     rates = {"controller.sample_hz": rate_hz, "controller.actuation_hz": rate_hz}
     return {"controller.clock_hz": CLOCK_HZ, "amplifier.delay_s": 0.0, **rates}
 
@@ -76,9 +76,9 @@ class Gain:
 
     @property
     def ratio(self) -> float | None:
-        """The largest stiffness at the highest rate over that at the scene's own rates.
+        """The largest stiffness at the highest rate, divided by the largest at the scene's own rates.
 
-        It is None where the latter is 0, or a map is clipped.
+        None if the divisor is 0, or a map is clipped.
         """
         if not self.own.largest_n_per_m or self.own.clipped or self.maps[-1].clipped:
             return None

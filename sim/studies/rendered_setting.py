@@ -44,7 +44,7 @@ def rate_text(rate_hz: int) -> str:
 
 
 def slow_hz(frequencies_hz: Iterable[int]) -> int:
-    """Return that of some frequencies which is nearest to `SLOW_HZ`, as a ratio."""
+    """Return the frequency nearest to `SLOW_HZ`, by ratio."""
     return min(frequencies_hz, key=lambda frequency_hz: abs(math.log(frequency_hz / SLOW_HZ)))
 
 
@@ -57,7 +57,7 @@ class Setting:
         rate_hz: the rate of estimator and force; None for the scene's own.
         case: the scene at that rate.
         waves: results of `impedance.measure` by frequency, in Hz, ascending.
-        spring: that of the spring alone, at `slow_hz`; None without any frequency.
+        spring: the value of the spring alone, at `slow_hz`; None without any frequency.
         contacts: results of `hardness.measure`, by speed.
     """
 

@@ -15,7 +15,7 @@ FREE = "free"
 
 
 class OrderError(ValueError):
-    """An order that is none: one line that says what is accepted."""
+    """An invalid order; the one line of the message says what is accepted."""
 
 
 @dataclass(frozen=True)

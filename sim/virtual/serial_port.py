@@ -79,10 +79,10 @@ class Line:
         return self._listener.getsockname()[1] if self._listener else None
 
     def take(self, wait_s: float, room: int) -> bytes:
-        """Return the bytes that have come from hosts, and wait for them for some time; what is lost is left out.
+        """Return the bytes that have come from hosts, and wait for them for some time, without lost bytes.
 
-        A host waits for an answer, so what sends more than there is room for is none. What it sends is lost, so that
-        others are soon heard again: a guest is sent away, with all that it has sent.
+        A host waits for an answer, so a sender of more bytes than `room` is no host. If it is a guest it is sent away,
+        and all its bytes are dropped, so that others are soon heard again.
 
         Args:
             wait_s: the longest wait, s.

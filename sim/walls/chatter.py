@@ -88,7 +88,7 @@ def at_rest(scene: Scene, backend: str) -> Chatter:
     """Return the chatter of a scene's estimator.
 
     Args:
-        scene: the scene, of which estimator, gains, output and rates are used.
+        scene: the scene; its estimator, gains, output and rates are used.
         backend: `float` or `fixed`.
 
     Raises:

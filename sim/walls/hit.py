@@ -55,8 +55,8 @@ class Hit(Summary):
         mean_m: mean position of the window that was judged, or in the literal protocol before the settling mark, m;
             positive is inside the wall.
         rms_m: RMS distance that the verdict is of, m.
-        offset_m, drift_m_per_s: the way from the mean before the settling mark to that of the window that was judged,
-            and the slope of the position over it.
+        offset_m, drift_m_per_s: the distance from the mean before the settling mark to the mean of the judged window,
+            and the slope of the position over this window.
         judged: `stable`, `unstable` or `undecided`, as if the wall was touched: see `tally`.
         touched: whether the handle ever was within the wall, or felt it.
         force_sha256: digest of the drive words of every actuation, little-endian int32; None for `float`.
@@ -364,8 +364,8 @@ def run(
         traces: keep samples of the whole run and of the contact.
         progress: called with the number of samples done.
         vcd: for `rtl`, a VCD file to write, with every signal around the contact.
-        until_sure: end a run whose handle rests for ever, or outruns the encoder by far, and in the literal protocol
-            one that is certainly unstable; `rms_m` is then 0, infinite, or the RMS up to that point.
+        until_sure: end a run whose handle rests for ever, or outruns the encoder by far; in the literal protocol also a
+            run that is certainly unstable. `rms_m` is then 0, infinite, or the RMS up to that point.
 
     Raises:
         RuntimeError: if the handle outran every decoder's limit by far, or the RTL could not be built.

@@ -5,9 +5,10 @@ and from nothing else. Time enters by differences alone. So a loop that is in on
 between for ever, and if the handle did not move in between it never will. Equal is exact: no digit of any number
 differs.
 
-What is left out is what no such future sees: the stamps of edges, if the estimator looks at none, and the number of the
-sample, which the clock of the decoder must be in step with. Some loops are never said to repeat: hardware, whose state
-is its own, estimators that look at stamps, encoders whose lines take time, and pulses of a carrier.
+Two things are left out, because no such future sees them: the stamps of edges, if the estimator uses none; and the
+number of the sample, with which the clock of the decoder must be in step. Some loops never count as repeating:
+hardware, because its state is hidden; estimators that use stamps; encoders whose lines take time; and pulses of a
+carrier.
 """
 
 import math

@@ -1,8 +1,9 @@
 """The largest stiffness in theory: two bounds for passivity, and the exact boundary of the linear loop.
 
-- Colgate and Schenkel: a wall of K and B sampled every T, with its force d periods late, is passive on a rigid handle
-  if at every angle a = w T, b > K T / 2 sin((d + 1/2) a) / sin(a / 2) - B cos((d + 1) a): for d = 0, b > K T / 2 + |B|.
-  The condition is theirs for a plain difference at the force's rate; a fractional d lies between its neighbours.
+- Colgate and Schenkel: let a wall of K and B be sampled every T, with its force d periods late. It is passive on a
+  rigid handle if at every angle a = w T, b > K T / 2 sin((d + 1/2) a) / sin(a / 2) - B cos((d + 1) a). For d = 0 this
+  is b > K T / 2 + |B|. The condition is theirs for a plain difference at the force's rate; a fractional d lies between
+  its neighbours.
 - Abbott and Okamura: with B = 0, position quantised to q and Coulomb friction f_c, passive if also K <= 2 f_c / q.
 - Linear: in contact, without sticking friction, limits, quantisation and a carrier's pulses, the loop with a linear
   estimator is linear and periodic with the force's update. It is stable while every eigenvalue of the state's change
@@ -182,8 +183,9 @@ def linear_limit_n_per_m(loop: Loop, damping_n_s_per_m: float) -> float:
         damping_n_s_per_m: damping of the wall.
 
     Returns:
-        That stiffness, refined between two neighbours of a search: stable islands above it, and unstable islands
-        between two neighbours, are not searched for. 0 if even the least is unstable, infinite if none is found.
+        That stiffness, refined between two neighbours of a search. Stable islands above it, and unstable islands
+        between two neighbours, are not searched for. It is 0 if even the least is unstable, infinite if no unstable one
+        is found.
     """
     stable = SEARCHED_N_PER_M[0]
     for stiffness in SEARCHED_N_PER_M:

@@ -1,8 +1,8 @@
-"""The worst of several variants of a case, such as the hands that may hold a handle: at every wall the variant in which
-the fewest hits are stable.
+"""The worst of several variants of a case, for instance of several hands on the handle: at every wall, the variant with
+the fewest stable hits.
 
-All variants hit a wall from the same starts. A map of the worst case is a map like others, of walls that each have the
-verdicts of their worst variant: its boundary is the K at which the least P(stable) over the variants passes one half.
+All variants hit a wall from the same starts. A map of the worst case is an ordinary map: each wall has the verdicts of
+its worst variant. So its boundary is the K at which the least P(stable) over the variants passes one half.
 """
 
 from collections.abc import Sequence
@@ -60,8 +60,8 @@ def of(walls: dict[str, Wall]) -> list[str]:
 
 
 def report(variants: dict[str, tuple[Wall, ...]], boundary: list[BoundaryPoint]) -> dict[str, Any]:
-    """Return what a report says of a worst case: the names of the variants, and those that are worst at every point of
-    the boundary, and at every wall of `p_stable`."""
+    """Return the report of a worst case: the names of the variants, and the worst ones at every point of the boundary
+    and at every wall of `p_stable`."""
     return {
         "hands": list(variants),
         "worst_of_boundary": [at_edge(variants, point) for point in boundary],

@@ -49,7 +49,7 @@ def uniform(seed, stream, first, second):
 def normal(seed, stream, first, second):
     """Return the random number of two whole numbers, normally distributed with mean 0 and sigma 1.
 
-    It is that of Box and Muller, from two words: no number is more than 6.8 sigma from 0.
+    The method is Box and Muller's, from two words: no number is more than 6.8 sigma from 0.
     """
     word = word_of(seed, stream, first, second)
     other = mixed(word ^ GOLDEN)

@@ -75,8 +75,8 @@ class Span(NamedTuple):
 def span(handle, seconds):
     """Return the `Span` of `seconds` >= 0 of this handle.
 
-    Below |z| = 1/4 the difference in phi2 would cancel, so its Taylor series 2 phi2 = 1 + z/3 (1 + z/4 (1 + ...)) is
-    summed to where the next term is under 2**-53; and a short series serves the microseconds between events.
+    Below |z| = 1/4 the difference in phi2 would cancel. So its Taylor series 2 phi2 = 1 + z/3 (1 + z/4 (1 + ...)) is
+    summed until the next term is under 2**-53. A short series serves the microseconds between events.
     """
     z = -handle.viscous_n_s_per_m * seconds / handle.mass_kg
     if z > -0.25:
@@ -98,8 +98,8 @@ def span(handle, seconds):
 def glide(motion, net_n, interval):
     """Return the `Motion` after the span `interval` under a constant net force, also if the velocity passes zero.
 
-    The change of velocity is added to the old velocity: multiplying by e^z instead would repeat that factor's rounding
-    in every interval, a bias of the friction by up to 2**-53 / |z| of itself.
+    The change of velocity is added to the old velocity. Multiplying by e^z instead would repeat that factor's rounding
+    in every interval. This would bias the friction by up to 2**-53 / |z| of itself.
     """
     change = motion.velocity_m_per_s * interval.decay + net_n * interval.velocity_per_newton
     travel = motion.velocity_m_per_s * interval.coast_s + net_n * interval.position_per_newton
@@ -138,8 +138,8 @@ def turned(before, after):
 def turn(handle, motion, net_n, seconds):
     """Return the time (s) and the `Motion` at which the velocity reaches zero, for a motion that has `turned`.
 
-    v = 0 at t = (m / b) log(1 + b w) with w = -v0 / net; the time is held within 0 to `seconds`, the interval in which
-    the turn was found, against the rounding of either.
+    v = 0 at t = (m / b) log(1 + b w) with w = -v0 / net. The time is held within 0 to `seconds`, the interval in which
+    the turn was found, against rounding.
     """
     velocity = motion.velocity_m_per_s
     at = seconds
