@@ -90,9 +90,7 @@ def command(
     out = output_file(out, "--out", (".npz",))
     values, sources = values_of(words or []), _sources(trigger)
     if last and (words or arm or (trigger, before, decimation, level) != (TRIGGER, None, 1, 0.0)):
-        raise BadInput(
-            "--last reads what is there: it goes with no word, --arm, --trigger, --before, --decimation, --level"
-        )
+        raise BadInput("--last reads a finished capture: no word, --arm, --trigger, --before, --decimation or --level")
     with axis_at(port, baud, identity, pace) as axis:
         if values:
             axis.set(**values)

@@ -23,7 +23,7 @@ SUFFIX = ".toml"
 
 @dataclass(frozen=True)
 class Done:
-    """What was done with a file.
+    """The result of a command on a file.
 
     Attributes:
         act: what was asked for.

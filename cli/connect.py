@@ -18,7 +18,7 @@ KINDS = tuple(kind for kind in Kind if kind not in (Kind.PULSE, Kind.CONSTANT))
 
 @dataclass(frozen=True)
 class Board:
-    """What a board says of itself.
+    """A board's description of itself.
 
     Attributes:
         summary: values, by key.

@@ -29,6 +29,6 @@ def command(
     backend: ModelOption = "fixed",
 ) -> None:
     changes = options.changes()
-    refuse_for_maps(changes, "it is what is searched")
+    refuse_for_maps(changes, "it searches them")
     cases = [Case.of(scene, changes) for scene in dict.fromkeys(scenes or cutoff.SCENES)]
     options.finish(cutoff.study(cases, mapper_of(options, backend, starts)))

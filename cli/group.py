@@ -126,7 +126,7 @@ def run() -> None:
 
         raise BadInput(refusal(error)) from None
     except (KeyError, ValueError):
-        # A shell that asks without the words so far is told nothing: what is printed stands in its user's line.
+        # A shell that asks without the words so far gets nothing: any output would land in its user's line.
         if COMPLETING not in os.environ:
             raise
         sys.exit(1)

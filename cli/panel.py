@@ -42,7 +42,7 @@ class Place(NamedTuple):
             return kept_token(self.port, self.renew)
         if self.renew:
             raise BadInput(
-                "--new-token is for a page at a fixed port (--http) of this machine: others have a new one anyway"
+                "--new-token needs a fixed port (--http) of this machine: other pages get a new token at each start"
             )
         return new_token()
 

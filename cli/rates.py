@@ -33,7 +33,7 @@ def command(
     backend: ModelOption = "fixed",
 ) -> None:
     changes = options.changes()
-    refuse_for_maps(changes, "it is what is searched")
+    refuse_for_maps(changes, "it searches them")
     refuse(changes, RATES, "see --rates")
     rates_hz = sorted(rates_of(tried, "--rates")) if tried is not None else list(rates.RATES_HZ)
     case = Case.of(scene, changes)

@@ -80,7 +80,7 @@ class ReadingOptions(StudyOptions):
 
     @property
     def reading(self) -> Reading:
-        """What the options say of a file.
+        """The options for reading a file, checked.
 
         Raises:
             BadInput: if they contradict each other.

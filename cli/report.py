@@ -115,7 +115,7 @@ def _do_all(steps: Iterable[Callable[[], None]]) -> None:
     """Do every step, whichever of them fails.
 
     Raises:
-        Exception: the one that failed, or the first that must not fail.
+        Exception: if one step fails, its error; if several do, the first one that is no OSError or RuntimeError.
         RuntimeError: if several failed; the message names them all.
     """
     failures = []
@@ -132,7 +132,7 @@ def _do_all(steps: Iterable[Callable[[], None]]) -> None:
 
 
 def _pictures(name: str) -> Any:
-    """Return a module of pictures by `.` and its name, which is that of the command.
+    """Return a module of pictures by `.` and its name, the command's name.
 
     It is imported only if something is drawn: Matplotlib is slow, and commands of a board have no room `sim`.
     """

@@ -107,7 +107,7 @@ def refuse(changes: dict[str, Any], keys: tuple[str, ...], instead: str) -> None
     """Refuse changes of scene keys that the command sets itself; `instead` is the reason."""
     for key in changes:
         if key.startswith(keys):
-            raise BadInput(f"--set {shown(key)} is what this command sets itself: {instead}")
+            raise BadInput(f"--set {shown(key)} must be absent (this command sets it): {instead}")
 
 
 def refuse_for_maps(changes: dict[str, Any], estimators: str) -> None:

@@ -52,6 +52,6 @@ def command(
                 said = holder
                 print(f"lease: {holder or 'free'}", flush=True)
             if teller:
-                # What it tells is less than what it is told, by that margin.
+                # It tells less than it is told, by that margin.
                 teller.tell(relay.pace * MARGIN)
             time.sleep(LOOK_S)

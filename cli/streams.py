@@ -44,7 +44,7 @@ def prepare() -> None:
         try:
             os.fstat(number)
         except OSError:
-            # A stream that was closed at the start would be the next file that is opened. This one cannot be written.
+            # If a stream is closed at the start, the next opened file takes its number. This one cannot be written.
             os.open(os.devnull, os.O_RDONLY)
     # Where a caller of `main` collects the output, its streams stay.
     if sys.stdout is sys.__stdout__:

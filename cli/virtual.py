@@ -75,11 +75,11 @@ def command(
         raise BadInput(f"--netlist must be one of {', '.join(FAMILIES)}, not {shown(netlist)}")
     of = load(scene, changes_of(set_, controller__estimator=estimator))
     counted = _Counts() if counts else None
-    # What is entered first is left last: a terminal that takes no counts any more holds up nothing else.
+    # The first context is left last: a terminal that takes no more counts then blocks nothing else.
     counting = undone(counted.end) if counted else nullcontext()
     # A host that knows a port asks at once who tells its pace.
     with counting, Line(tcp) as line, Teller(line.names) as teller, VirtualBoard(of, baud, netlist) as board:
-        # The first call compiles, for which no host would wait.
+        # The first call compiles; no host would wait so long.
         board.run()
         print(f"serial port: {line.path}")
         if line.tcp_port is not None:

@@ -10,7 +10,7 @@ from amaranth.lib.cdc import FFSynchronizer
 SYNCHRONISER = {"ASYNC_REG": "TRUE", "keep": "true"}
 """Attributes of every stage of a synchroniser: place the stages side by side, and neither merge nor move them."""
 ADDED = "added/"
-"""What tools call the files of others: their messages name `added/FILE`, and rules for our own text leave them out."""
+"""The names of others' files for the tools: messages name `added/FILE`, and rules for our own text skip these."""
 
 
 class AnyPart:

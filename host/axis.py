@@ -63,14 +63,14 @@ class Axis(Named):
 
     def __init__(self, port: Port, device: Device, shared: Shared | None = None, number: int = 0):
         self.device, self._port = device, port
-        # The time, of time.monotonic, after which nothing that is written goes out, except a disarm and beats.
+        # The time, of time.monotonic, after which no write goes out, except a disarm and beats.
         self._until_s = math.inf
         self._words = Words(port, device, None if shared is None else shared.words, self._check_time)
         self.wall, self.supervisor = Wall(self), Supervisor(self)
         self.capture = Capture(self, number)
         self._status = device.of_kind(Kind.STATUS)
-        # Whether it may be ARMED by this program; and whether it may be, though this program does not want it: a host
-        # that has gone left it so, or an answer was lost. It is disarmed before the heartbeat goes on.
+        # Whether this program may have ARMED it; and whether it may be ARMED against this program's wish: by a host
+        # that has gone, or after a lost answer. It is disarmed before the heartbeat goes on.
         self._may_drive, self._unwanted = False, self.status.state is State.ARMED
         # Whether a disarming has begun since the last arming did. There is no lock, for one who ends this program must
         # not wait for a thread that is held up in `arm`.
@@ -162,7 +162,7 @@ class Axis(Named):
 
     def _check_time(self) -> None:
         if time.monotonic() > self._until_s:
-            raise LateError("the board did not answer in time: what was not done by then is not done any more")
+            raise LateError("the board did not answer in time: the rest was not sent")
 
     def _check_wanted(self) -> None:
         self._check_time()
@@ -342,7 +342,7 @@ class Axis(Named):
         if trip:
             word = self.device.registers["acknowledged"]
             self._port.write(word.address, word.to_registers(trip.latched), Sending(check=self._check_time))
-            # What the encoder says is a cause until the flags are cleared, so that comes first.
+            # The encoder's flags are a cause until they are cleared, so this comes first.
             self.pulse("clear_flags")
             self.pulse("acknowledge")
         if now := self.trip:

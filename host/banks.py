@@ -16,7 +16,7 @@ from .shared import Shared
 class BankPort(Port):
     """A port to the bank of one of several axes, by the addresses of an axis that is alone.
 
-    Some registers exist once for all axes: the constants, the counters of the link, the host's own words and those of
+    Some registers exist once for all axes: the constants, the counters of the link, and the words of the host and of
     the capture memory. They are read and written at their own addresses.
 
     Args:
@@ -36,12 +36,12 @@ class BankPort(Port):
 
     @property
     def pace(self) -> float:
-        """That of the line."""
+        """The pace of the line: see `Port.pace`."""
         return self._line.pace
 
     @property
     def lease(self) -> str | None:
-        """That of the line."""
+        """The lease of the line: see `Port.holder`."""
         return self._line.lease
 
     def line_s(self, count: int) -> float:

@@ -80,7 +80,7 @@ class Captured:
 
 
 class Board(Protocol):
-    """What a capture needs of an axis: see `hardwall.host.axis.Axis`."""
+    """The part of `hardwall.host.axis.Axis` that a capture needs."""
 
     device: Device
 

@@ -23,7 +23,7 @@ BYTES_MAX = 10**6
 DIGITS = 17
 """The digits with which every float is told from every other."""
 FACTS = "identity", "clock_hz", "clocks_per_sample", "capture_registers", "axes"
-"""What a file says of its board: attributes of `Device`."""
+"""The facts on a board in its file: attributes of `Device`."""
 HEAD = """\
 # The words of a board, in SI units, for `hardwall config load PORT FILE`. A word that is left out stays as it is.
 
@@ -79,7 +79,9 @@ class Config:
         except (ValueError, RecursionError) as error:
             raise ConfigError(f"{name} is no TOML: {error}") from None
         if found.keys() != {"board", "words"} or not all(isinstance(each, dict) for each in found.values()):
-            raise ConfigError(f"{name} must have the tables [board] and [words] alone, as `hardwall config save` does")
+            raise ConfigError(
+                f"{name} must have only the tables [board] and [words], as `hardwall config save` writes them"
+            )
         facts, words = found["board"], found["words"]
         if facts.keys() != {*FACTS}:
             raise ConfigError(f"{name}: [board] must have {', '.join(FACTS)}, not {shown([*facts])}")
@@ -137,7 +139,7 @@ class Config:
         if axis.status.state is State.ARMED:
             raise NotReadyError("the axis is ARMED: disarm it before a configuration is loaded")
         if self.differences(axis) != list(differences):
-            raise ChangedError("the words of the board are others than those that were shown: nothing was loaded")
+            raise ChangedError("the words of the board have changed since they were shown: nothing was loaded")
         before = {name: axis.get(name) for name in axis.names}
         # Where another program may write, or has written, that is said before anything is.
         axis.renew()

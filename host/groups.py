@@ -5,7 +5,7 @@ from typing import Protocol
 
 
 class Words(Protocol):
-    """What has words by name."""
+    """An object with words by name."""
 
     def get(self, name: str) -> float:
         """Return the SI value that is used."""

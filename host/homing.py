@@ -10,7 +10,7 @@ from .errors import NotReadyError
 from .status import State, Status
 
 INDEX = "the index: move the handle over it"
-"""What homing waits for."""
+"""The event that homing waits for."""
 LOST = "the index was found, but the scale has slipped since: see to the encoder, clear what it says, and home again"
 
 
@@ -22,7 +22,7 @@ class Homed(NamedTuple):
 
 
 class Board(Protocol):
-    """What homing needs of an axis: see `hardwall.host.axis.Axis`."""
+    """The part of `hardwall.host.axis.Axis` that homing needs."""
 
     device: Device
 

@@ -40,7 +40,7 @@ TRIES = 5
 PAUSE_S = 0.025
 """The silence behind which the board takes the next byte for the beginning of a request."""
 EXCEPTIONS = {1: "it does not know the function", 2: "it has no such register", VALUE: "a value is out of its range"}
-"""What an exception of Modbus says of a request, but `FAILURE`."""
+"""The meaning of a Modbus exception, except `FAILURE`."""
 
 
 class Port:
@@ -84,7 +84,7 @@ class Port:
         self._in_step, self._gone = False, False
         # Whether other programs have the board, too, behind this port.
         self._shared = False
-        # Whether it has ever been in step; and when something was last sent, of which the board may await the rest.
+        # Whether it has ever been in step; and the time of the last sent bytes, whose rest the board may await.
         self._known, self._sent_s = False, time.monotonic()
         try:
             self._client.connect()
@@ -215,16 +215,16 @@ class Port:
             raise RefusedError(f"the board refuses to {request.what}: {said}", code)
         if not request.fits(answer):
             self._in_step = False
-            raise ForeignError(f"the answer to the request to {request.what} does not fit it")
+            raise ForeignError(f"the answer does not fit the request to {request.what}")
         return answer
 
     def _check_shared(self, request: Request, code: int) -> None:
         """Raise the error for an exception that comes from `hardwall share`, not from the board."""
         if code == NO_ANSWER:
-            raise SilentError(f"nothing answers behind {self.name} to the request to {request.what}")
+            raise SilentError(f"the board behind {self.name} does not answer the request to {request.what}")
         if code == STALE:
             raise ChangedError(
-                f"another program has written to the board at {self.name} since this one came: connect again"
+                f"another program has written to the board at {self.name} since this program connected: connect again"
             )
         if code == HELD:
             said = self._answer(Request.lease())
@@ -281,8 +281,8 @@ class Port:
                     return
         if self._known:
             # What came may have been late, of requests before.
-            raise SilentError(f"what answers at {self.name} is late, or does not repeat any more what it is told")
-        raise ForeignError(f"what answers at {self.name} does not repeat what it is told, as an axis does")
+            raise SilentError(f"the device at {self.name} answers late, or no longer echoes a test request")
+        raise ForeignError(f"the device at {self.name} does not echo a test request, as an axis does")
 
     def _drain(self, silent_s: float) -> None:
         """Read and drop bytes until none comes for some time. If bytes keep coming, the device is no board."""

@@ -73,7 +73,7 @@ class Relay:
         try:
             self._listener = socket.create_server((LOOPBACK, number))
         except OSError as error:
-            raise PortError(f"port {number} of {LOOPBACK} cannot be had: {error.strerror}") from None
+            raise PortError(f"port {number} of {LOOPBACK} cannot be opened: {error.strerror}") from None
         self.name = f"{NETWORK}{LOOPBACK}:{self._listener.getsockname()[1]}"
         self.failure: HostError | None = None
         # Whose turn it is: one request at a time, the holder's first; and how many wait, of the holder and of others.
@@ -218,7 +218,7 @@ class Relay:
         """Wait, with the lock, until a request of the holder, or of another program, may go out."""
         self._waiting[holds] += 1
         while not self._may_go(holds):
-            # The end of a request wakes all; the time for which the line is kept ends by itself.
+            # The end of a request wakes all; the line's waiting time ends by itself.
             self._turns.wait(GRACE_S)
         self._waiting[holds] -= 1
 

@@ -117,7 +117,7 @@ def _relayed(client: Any, request: bytes) -> Relayed:
     while not _is_whole(answer):
         came = client.recv(None)
         if not came or len(answer) > FRAME_MAX:
-            raise ModbusIOException("no answer that is whole")
+            raise ModbusIOException("an incomplete answer")
         answer += came
     return Relayed(answer[:-2])
 

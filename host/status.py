@@ -1,4 +1,4 @@
-"""What a board shows: the state of its axis, and why it tripped."""
+"""The status of a board: the state of its axis, and the causes of a trip."""
 
 from dataclasses import dataclass
 from enum import IntEnum

@@ -66,7 +66,7 @@ class RecordTime:
 
     @property
     def said(self) -> str:
-        """What a message on the axis has to say of its second."""
+        """The words of a message on the axis about its second."""
         return f"as if {self.second} samples were a second"
 
     def to_axis(self, value: float, power: float) -> float:

@@ -142,7 +142,7 @@ def velocity_of_edges(
     words = time.words(word for word in design.words if word.name != design.output_word())
     axis = Axis(spec, floating, **time.settings(words, settings), **design.choose(output))
     clocks = clocks_of(since, sample_hz * spec.clocks_per_sample, unsure_s)
-    # The count at a strobe is that of DECODER_CLOCKS before it; the record starts at the strobe of sample 0.
+    # The count at a strobe is the count DECODER_CLOCKS before it. The record starts at the strobe of sample 0.
     first = timing.strobe - DECODER_CLOCKS
     record = run(axis, first + clocks[1:], level(array[1:] - array[0]), len(sampled), int(level(0)))
     _tell(found, spec.design.flag_names(int(record.flags[-1])))

@@ -32,7 +32,7 @@ CLOCK_HZ_MAX = 1 << 48
 RATES_HZ = 1, 10**9
 """The least and the largest sample rate of an axis or a recording, Hz."""
 EDGE_ERROR_COUNTS = 0.1
-"""The default RMS error of single edges, counts: that of a poor scale."""
+"""The default RMS error of single edges, counts: a poor scale's."""
 JERK_SHARE = 2.0**-7
 """The default bound on the jerk, as a share of C divided by the time in which C moves half a count."""
 

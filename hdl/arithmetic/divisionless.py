@@ -75,7 +75,7 @@ class Divisionless(wiring.Component):
         check_int("term_width", term_width, 1)
         self._fraction = fraction
         self._digits, self._digit = model.digits(quotient_width + 1)
-        # Bits of the quotient before the point, with those of the digits that it does not use.
+        # Bits of the quotient before the point, including unused bits of its digits.
         self._whole = self._digits * self._digit - fraction - 1
         narrow, wide = max(model.FINE + 1, factor_width), max(divisor_width + self._whole + 1, term_width)
         super().__init__(
@@ -193,7 +193,7 @@ class Divisionless(wiring.Component):
             m.d.sync += s.remainder.eq(following)
             m.next = "DIGIT"
         with m.State("DIGIT"):
-            # The last digit counts one more, so that the top bit of what is left says whether the quotient does.
+            # The last digit counts one more, so that the top bit of the remainder says whether the quotient does.
             m.d.comb += [s.narrow.eq(leading + last), s.wide.eq(s.t)]
             m.d.sync += s.made.eq(Cat(leading[:digit], s.made + leading[digit]))
             m.next = "CORRECT"

@@ -15,7 +15,7 @@ from ..wires import names_of
 
 
 class At(NamedTuple):
-    """What there is at the host's address.
+    """The register at the host's address.
 
     Attributes:
         place, bank: its lowest bits, and the bank, which may be none.

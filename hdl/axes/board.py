@@ -132,7 +132,7 @@ class AxesBoard(wiring.Component):
         m.d.comb += lead_out(axes, self, ENCODER)
         m.d.comb += axes.slip.eq(stood.replicate(self.spec.axes))
         m.d.comb += lead_out(link, self, link.PINS)
-        # A channel without a complement is unlike what stands for that, whatever the clock edge sees.
+        # A channel without a complement differs from its stand-in, whatever the clock edge sees.
         m.d.comb += [axes.encoder_a_n.eq(~axes.encoder_a), axes.encoder_b_n.eq(~axes.encoder_b)]
         m.d.comb += given(axes, {name: loop.replicate(self.spec.axes) for name, loop in loops.items()})
         parts = {False: ports(axes)}

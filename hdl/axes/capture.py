@@ -96,7 +96,7 @@ class AxesCapture(Block):
         with m.If(self.capture_start):
             m.d.sync += axis.eq(self.capture_axis)
 
-        # What the record and the turn of a sample show is kept until those of the next.
+        # The record and the turn of a sample are kept until the next sample's.
         recorded = self.record_valid & (self.record_axis == axis)
         velocity = self.record_velocity >> len(self.record_velocity) - len(memory.velocity)
         seen = {"count": self.record_count, "velocity": velocity, "wall_force": self.record_wall_force}

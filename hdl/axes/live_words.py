@@ -11,7 +11,7 @@ from .pipe import Pipe
 
 
 class Writing(NamedTuple):
-    """What the host writes in this clock: the axis, the number of a word and the word, and whether it does."""
+    """The host's write in this clock: the axis, the number of a word, the word, and whether there is a write."""
 
     axis: Value
     number: Value

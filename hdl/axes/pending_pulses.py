@@ -1,4 +1,4 @@
-"""What an axis's decoder, pins and host did since its last sample, and since the last look of a turn."""
+"""Events of an axis's decoder, pins and host since its last sample, and since the last look of a turn."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -57,7 +57,7 @@ def looked_at(pipe: Pipe, waiting: Mapping[str, Value], asked: Asked, look: int)
         look: the stage.
     """
     m = pipe.m
-    # One mask serves all axes: a later acknowledgement makes void those that wait.
+    # One mask serves all axes: a later acknowledgement replaces the waiting ones.
     acknowledges, acknowledged = Signal(pipe.axes), Signal.like(asked.acknowledged, name="acknowledged_last")
     m.d.sync += acknowledges.eq(acknowledges & ~Cat(pipe.turns(look)))
     with m.If(asked.acknowledge.any()):

@@ -1,4 +1,4 @@
-"""What the stages of a pipeline of axes share: registers, delays, and a word kept for every axis from pass to pass.
+"""The common parts of a pipeline's stages: registers, delays, and a word kept for every axis from pass to pass.
 
 A pass is one sample of one axis on its way through the pipeline. It is in stage s during the s-th clock after its
 strobe, which is stage 0; a register loaded in stage s is seen in stage s + 1.

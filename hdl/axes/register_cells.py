@@ -45,12 +45,12 @@ class Cells:
         self.taking: dict[str, Signal] = {}
 
     def take(self, m: Module, file: Component, asked: Signal) -> None:
-        """Load `shift` as told, from the file's host and inputs; a status is that of the axis asked."""
+        """Load `shift` as told, from the file's host and inputs; a status comes from the axis asked."""
         host = file.host
         status = held_status(m, file, asked, self.moments)
         takes = {"value": host.value, "status": status}
         if file.design.registers.capture:
-            # That memory is large, and far away: what it gives has a register of its own first.
+            # That memory is large and far away: its output has its own register first.
             takes["capture"] = arrived = Signal(CELL_BITS)
             m.d.comb += file.capture_address.eq(host.address)
             m.d.sync += arrived.eq(file.capture_data & file.capture_done.replicate(CELL_BITS))

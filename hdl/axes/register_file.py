@@ -301,7 +301,7 @@ class BankedFile(wiring.Component):
     def _give_pulses(self, m: Module, axes: Axes, pulses: Pulses, walk: CommitWalk) -> None:
         """Add the states that give the pulses, and wait until they have acted."""
         with m.State("PULSE"):
-            # One of all axes has a single bit, which is that of the only bank that it is written to in.
+            # A pulse for all axes has a single bit: the bit of the only bank in which it is written.
             for bit, name in enumerate(pulses.names):
                 m.d.sync += port(self, name).eq(Mux(pulses.marks[bit], Const(1) << axes.to, 0))
             m.d.sync += [pulses.marks.eq(0), walk.settling.eq(self._design.settle_clocks)]

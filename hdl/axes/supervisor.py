@@ -37,7 +37,7 @@ class Turn(NamedTuple):
 
 
 class Judged(NamedTuple):
-    """What a turn decides, 2 stages later.
+    """The decision of a turn, 2 stages later.
 
     Attributes:
         drives: whether the axis stays ARMED: otherwise the drive that is let out is zero.

@@ -180,8 +180,8 @@ class Axis(Component):
             self.strobe_busy.eq(strobe & working & ~estimator.valid),
         ]
 
-        # What a strobe has taken is kept up to the velocity, with which the next strobe may come; and then up to the
-        # next velocity, which comes behind the changed drive.
+        # The words that a strobe has taken are kept up to the velocity; the next strobe may come with it. Then they are
+        # kept up to the next velocity, which comes after the changed drive.
         taken_count = Signal.like(self.sampled_count)
         taken_fault, fault = Signal(len(ENCODER_FLAGS)), Signal()
         with m.If(strobe):

@@ -22,7 +22,7 @@ from .supervised import COMPLEMENTS, LOOPS, SupervisedAxis
 ENCODER = ("encoder_a", "encoder_b", "encoder_z", *COMPLEMENTS)
 """Pins of the encoder."""
 CAPTURED = ("sampled", "wall_force", "driven", "state", "live", "flags", "stamp")
-"""What the capture memory takes as the axis shows it."""
+"""The axis's outputs that the capture memory takes unchanged."""
 
 
 class Board(wiring.Component):
@@ -172,7 +172,7 @@ class Board(wiring.Component):
         armed = axis.state == ARMED
         refused = {"arm": ~axis.ready, "preload": armed, "origin_shift": armed}
         # At most two samples of the old count, or of the old words, are under way, so the drive of the third actuation
-        # follows the new ones. An axis that is ARMED drives meanwhile anyway, so its commit does not wait for that.
+        # follows the new ones. An ARMED axis drives meanwhile anyway, so its commit does not wait for it.
         old = Signal(2)
         with m.If(axis.preload | axis.origin_shift | (axis.commit_pending & ~armed)):
             m.d.sync += old.eq(3)

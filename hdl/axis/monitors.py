@@ -119,8 +119,9 @@ class Monitors(Block):
         """Return whether the count is beyond a limit: one comparison, of both limits in turn."""
         at_low, wrong, wrong_before = Signal(init=1), Signal(), Signal()
         limit = Signal.like(self.count)
-        # The limit waits as its complement, which a subtraction adds: the low one with a carry, so that the difference
-        # is negative below it, and the high one without, so that it is not negative above it.
+        # The limit waits as its complement, which a subtraction adds. The low limit is added with a carry: the
+        # difference is then negative below it. The high limit is added without: the difference is then not negative
+        # above it.
         m.d.sync += [
             at_low.eq(~at_low),
             limit.eq(~Mux(at_low, self.supervisor_position_high, self.supervisor_position_low)),

@@ -21,7 +21,7 @@ SWEPT = CELL_BITS + 4
 
 
 class At(NamedTuple):
-    """What there is at the host's address.
+    """The register at the host's address.
 
     Attributes:
         below: its lowest bits.
@@ -213,7 +213,7 @@ class RegisterFile(wiring.Component):
     def _capture(self, m: Module, cells: Cells) -> None:
         """Let the capture memory be found in the place of the cells."""
         m.d.comb += self.capture_address.eq(self.host.address)
-        # That memory is large, and far away: what it gives has a register of its own first.
+        # That memory is large and far away: its output has its own register first.
         arrived = Signal(CELL_BITS)
         m.d.sync += arrived.eq(self.capture_data & self.capture_done.replicate(CELL_BITS))
         with m.If(cells.captured):

@@ -48,9 +48,9 @@ class Transfers:
         m.d.comb += words.eq(self.chain[-len(words) :])
         head = max(len(loads[each]) for each in (Source.EDGE, Source.EVENTS))
         shifted, moment, edge, events = (Cat(load, shifted[len(load) :]) for load in loads.values())
-        # Two cells of four inputs a bit: the first gives one of two, or which of the two others it is. The bits of
-        # `source` are three, or the one that both cells have would be one signal, which takes three cells. They are
-        # words, so that a simulator has a few operations for all the bits.
+        # Two cells of four inputs a bit: the first gives one of two, or which of the two others it is. `source` has
+        # three bits: with one shared bit for both cells, that signal would take three cells. They are words, so that a
+        # simulator has a few operations for all the bits.
         first = Mux(self.source[0], moment, shifted)
         which = Mux(self.source[1], self.source[0].replicate(head), first[:head])
         one_of_two = (which & events[:head]) | (~which & edge[:head])

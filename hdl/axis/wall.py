@@ -113,8 +113,8 @@ class Wall(Block):
         m.d.sync += [known.eq(self.lead), placed.eq(known)]
         with m.If(self.lead):
             m.d.sync += counted.eq(self.count)
-        # The force is that of a spring to the surface and a damper, whatever the side: -side push = stiffness offset -
-        # damping velocity. The side says where it acts.
+        # The force is a spring to the surface and a damper, whatever the side: -side push = stiffness offset - damping
+        # velocity. The side says where it acts.
         with m.If(known):
             m.d.sync += offset.eq(self.wall_position - counted)
         pulled, spring = products("spring", self.wall_stiffness, offset)

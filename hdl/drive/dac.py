@@ -75,7 +75,7 @@ class Dac(Block):
         ready, waiting = Signal(), Signal(scale.latency)
         m.d.sync += [ready.eq(self.armed), waiting.eq(Cat(self.strobe, waiting[:-1]))]
 
-        # A place is a half of the serial clock's period; the last one is that of the pause behind the frame.
+        # A place is a half of the serial clock's period; the last one is the pause after the frame.
         bits, last = params.frame_bits, 2 * params.frame_bits + 1
         place, left, word = Signal(range(last + 2)), Signal(range(max(params.half, 2))), Signal(bits)
         next_place, goes_on = Signal.like(place), place.any() & (left == 0)

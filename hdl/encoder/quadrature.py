@@ -73,11 +73,11 @@ class Quadrature(wiring.Component):
     which derives all of this, also for edges out of place). Beyond that rate, as long as every level of A and of B
     lasts a clock or more (below 2 edges a clock), `fault` is up no later than the first wrong count, whatever the
     motion. At a steady rate of ideal quadrature above 2 edges a clock it is up within `clocks_to_fault` of the model.
-    An exception is the exact range around a multiple of 4: there the samples equal those of a slow motion. Two flags
-    are for that. `illegal`: A and B changed in one clock; nothing is counted or stamped. `overspeed`: the filter
-    rejected a pulse on A or B during which, its first and last clocks included, the other channel had an edge. A lone
-    glitch raises neither flag; a glitch that meets an edge of the other channel cannot be distinguished from speed, and
-    raises `overspeed`.
+    An exception is the exact range around a multiple of 4: there the samples equal a slow motion's. Two flags are for
+    that. `illegal`: A and B changed in one clock; nothing is counted or stamped. `overspeed`: the filter rejected a
+    pulse on A or B during which, its first and last clocks included, the other channel had an edge. A lone glitch
+    raises neither flag; a glitch that meets an edge of the other channel cannot be distinguished from speed, and raises
+    `overspeed`.
 
     Start: counting starts from the pins as sampled by the first clock after a reset, whatever their levels.
 
@@ -331,7 +331,7 @@ class Quadrature(wiring.Component):
         onward = known & (self.seen.down == down)
         m.d.comb += [
             lost.eq(both | outrun | self.slip | (self.invert ^ inverted)),
-            # Z on the lower side of this edge; `below` is that of the last one, if it is known.
+            # Z on the lower side of this edge; `below` is the last edge's, if it is known.
             z.eq(level[2] ^ (moved[2] & ~down)),
             index.eq(one & onward & (below == down) & (z != down) & ~lost),
         ]

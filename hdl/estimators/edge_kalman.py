@@ -92,7 +92,7 @@ class Estimator(EstimatorBlock):
             with m.State("SAMPLE"), m.If(self.strobe):
                 self._take(m, s)
                 m.next = next(iter(sequence))
-            # Every state takes one clock: what it always does, and then what it does under a condition.
+            # Every state takes one clock: first its unconditional actions, then the conditional ones.
             for (name, statements), following in zip(sequence.items(), after, strict=True):
                 with m.State(name):
                     m.d.sync += statements

@@ -97,8 +97,8 @@ class Estimator(EstimatorBlock):
         begun = Signal(signed(max(velocity.width + finer, len(step) + 2 * digits + 1) + 1))
         low, total, still = Signal(2 * digits), Signal(signed(len(begun) - 1)), Signal()
 
-        # The step has the other sign than e. A complement is one less than the negative: as the half LSB of u that is
-        # added for the rounding must be, for it is the product that is rounded half up.
+        # The step has the other sign than e. A complement is one less than the negative. So must be the half LSB of u
+        # that is added for the rounding, because the product is rounded half up.
         lambda_ = Cat(Const(0, coarser), self.levant_lambda, Const(0, 1)).as_signed()
         inverse = ~e[-1]
         against, fourfold = _inverted(lambda_, inverse), _inverted(lambda_ << 2, inverse)

@@ -271,7 +271,7 @@ class Estimator(EstimatorBlock):
         """Add the states that extrapolate the velocity from the anchor and hold it within the bound for no edge."""
         d = self._design
         with m.State("LINE PRODUCT"):
-            # A motion that goes on, faster than the bound allows, shows that the bound was none.
+            # A motion that goes on faster than the bound allows shows that the bound was wrong.
             goes_on = s.was_still | ((s.v < 0) == s.was_down)
             m.d.sync += [
                 s.onward.eq(Mux(s.room < 0, 0, s.room)),

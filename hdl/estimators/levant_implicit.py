@@ -43,7 +43,7 @@ class Estimator(levant_semi_implicit.Estimator):
         return super().elaborate(platform)
 
     def _factor(self, root):
-        # `done` is high for the one clock in which the second product is taken.
+        # `done` is high for one clock, in which the second product is taken.
         return Mux(root.done, super()._factor(root), self._word(0))
 
     def _square(self, m, product):

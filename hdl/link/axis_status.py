@@ -16,13 +16,13 @@ from ..arithmetic.fixed import shape
 from ..wires import ports
 
 RECORD = "count", "velocity", "wall_force", "drive", "flags"
-"""What the axes show of a sample, behind `record_`."""
+"""The axes' outputs for a sample; their names begin with `record_`."""
 TURN = "state", "ready", "latched", "first", "first_stamp", "counts", "a_channel_idle"
-"""What they show of a turn, behind `turn_`."""
+"""The axes' outputs for a turn; their names begin with `turn_`."""
 WITH_RECORD = "illegal_count", "index_count", "index_armed", "index_latched"
 """Outputs for every axis at every clock; an axis's are taken with its record."""
 OF_CAPTURE = "capture_state", "capture_place", "capture_stamp"
-"""What the capture memory shows, if there is one: the same in every bank, taken with the turn."""
+"""The status of the capture memory, if there is one: the same in every bank, taken with the turn."""
 EDGE_KIND_BITS = (len(EDGE_STAMPS) - 1).bit_length()
 
 

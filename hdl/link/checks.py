@@ -1,4 +1,4 @@
-"""What the register files of one axis and of several check: a register, a value against its bounds, and pulses."""
+"""The checks of the register files of one axis and of several: a register, a value against its bounds, and pulses."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib.wiring import Component, PureInterface

@@ -243,7 +243,7 @@ class Driver:
         if self._axis is None:
             return
         if not self._lives(tab):
-            raise NotReadyError("the tab that asks to arm is not heard")
+            raise NotReadyError("the tab that asks to arm does not answer")
         self._leave_home()
         self._axis.arm()
         self._see(holder=tab)
@@ -260,7 +260,7 @@ class Driver:
         if trip is None:
             return
         if trip.latched != latched:
-            raise HostError(f"other causes stand than those that were shown: {trip}")
+            raise HostError(f"the causes have changed since they were shown: {trip}")
         self._axis.acknowledge(trip)
 
     def _home(self, tab: str, index_m: float) -> None:
@@ -288,7 +288,7 @@ class Driver:
 
     def _check_holder(self, tab: str) -> None:
         if self.view.holder not in (None, tab):
-            raise NotReadyError("another tab armed the board, and alone may do that")
+            raise NotReadyError("another tab armed the board: only that tab may do this")
 
     def _record(self, tab: str, wish: Wish) -> None:
         self._check_holder(tab)

@@ -1,4 +1,4 @@
-"""What two velocity estimators make of the same counts, at every sample: bit-accurate models beside the board."""
+"""The velocities of two estimators from the same counts, at every sample: bit-accurate models beside the board."""
 
 import threading
 from collections import deque
@@ -66,7 +66,7 @@ class Estimates:
         self._count_m, self._moved_m = spec.count_m, 0.0
         self._records: deque[bytes] = deque(maxlen=KEPT)
         self._taken, self._lock = 0, threading.Lock()
-        # The first call compiles, for which no tab would wait.
+        # The first call compiles; no tab would wait so long.
         for lane in self._lanes:
             lane.run(np.zeros(1, np.int64))
 

@@ -25,7 +25,7 @@ FAULTS = {
     "stop": Fault("open emergency_stop", "close emergency_stop", "Open the emergency stop", "Close the emergency stop"),
     "clock": Fault("open clock", "close clock", "Stop the clock", "Start the clock"),
 }
-"""What may be broken, by name."""
+"""The parts that a hand may break, by name."""
 
 
 class Hand:

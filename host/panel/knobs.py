@@ -49,11 +49,11 @@ LABELS = {
     "encoder_invert": "Encoder inverted",
     "encoder_glitch_clocks": "Glitch filter, clocks",
 }
-"""What words are called on the page; others are called by their names."""
+"""The names of words on the page; other words keep their own names."""
 
 
 class Group(Enum):
-    """What words are for; the value is the heading."""
+    """The groups of words by purpose; the value is the heading."""
 
     WALL = "Wall"
     ESTIMATOR = "Estimator"
@@ -102,7 +102,7 @@ class Knob:
 
     @property
     def spoken(self) -> str:
-        """What it is called where it cannot be seen beside its unit."""
+        """Its name with the unit, for places without the unit beside it."""
         return f"{self.label}, {self.unit}" if self.unit else self.label
 
     def to_slider(self, value: float) -> float:

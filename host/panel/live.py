@@ -37,7 +37,7 @@ WORD_MAX = (1 << 32) - 1
 
 @dataclass(frozen=True)
 class Bench:
-    """What is beside a virtual board.
+    """The tools beside a virtual board.
 
     Attributes:
         hand: the hand at its handle.

@@ -22,7 +22,7 @@ from ...model.runtime.whole_file import whole_file
 
 BITS = 128
 FORM = re.compile(r"[A-Za-z0-9_-]{22}")
-"""What a token of so many bits looks like."""
+"""The form of a token of so many bits."""
 OTHERS, OTHERS_WRITE = 0o077, 0o022
 """The mode bits that give others any access, and the mode bits that let others write."""
 
@@ -42,7 +42,7 @@ class Token(NamedTuple):
 
     @property
     def about(self) -> str:
-        """What a person at the page must know of its address."""
+        """The text on the page about its address."""
         if self.file is None:
             return "This address ends with this program: the next start has another one."
         return (

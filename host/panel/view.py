@@ -25,12 +25,12 @@ ADVICE = {
     "external_fault": "Close the amplifier's fault loop",
     "emergency_stop": "Make sure that all is safe, and close the loop of the emergency stop",
 }
-"""What helps against a cause, by its name."""
+"""The remedy for a cause, by its name."""
 
 
 @dataclass(frozen=True)
 class View:
-    """What is known of a board.
+    """The state of a board.
 
     Attributes:
         device: what the board says of itself; None before the first connection.

@@ -59,7 +59,7 @@ class Inputs(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What is kept of the axis's last sample."""
+    """The values kept of the axis's last sample."""
 
     count: int = 0  # type: ignore[assignment]  # a tuple has a method of this name
     velocity: int = 0

@@ -47,7 +47,7 @@ class Params(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What an axis shows of a sample, and its words."""
+    """An axis's outputs for a sample, and its words."""
 
     count: int = 0  # type: ignore[assignment]  # a tuple has a method of this name
     fresh: int = 0  # the count was preloaded since the last sample, or there was none

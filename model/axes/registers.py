@@ -72,7 +72,7 @@ class AxesMap(RegisterMap):
         records = records_in(capture_registers)
         self.capture_registers, self.capture = capture_registers, Capture(spec, records) if records else None
         design = Design(spec)
-        # The same words in the same order as those of a single axis: the watchdog is among them.
+        # The same words in the same order as for a single axis; the watchdog is among them.
         live = (*design.supervisor.words, *design.monitors.words, design.live[-1])
         known = registers_of(spec, live)
         self._describe((*known, *(self.capture.registers() if self.capture else ())), design.committed)

@@ -60,7 +60,7 @@ class State(NamedTuple):
 
 
 class Params(NamedTuple):
-    """What is fixed for a design."""
+    """The constants of a design."""
 
     monitors: sampled_monitors.Params
     supervisor: supervisor.Params

@@ -53,7 +53,7 @@ RECORDS = 2048
 IDLE, FILLING, WAITING, TRIGGERED, DONE = range(5)
 STATES = ("IDLE", "FILLING", "WAITING", "TRIGGERED", "DONE")
 SOURCES = ("contact", "trip", "rise", "fall")
-"""What triggers: the wall's force becomes non-zero, the supervisor trips, the count passes the level up, or down."""
+"""The triggers: the wall's force becomes non-zero, the supervisor trips, the count passes the level up, or down."""
 STATE_FLAGS = ("armed", "tripped", "contact", "live")
 """The lowest flags of a record: the state of the supervisor, a force of the wall, a heartbeat that is not overdue."""
 DECIMATION_BITS = 12
@@ -62,7 +62,7 @@ TAKEN_AT = {"count": 0, "velocity": 2, "driven": 4, "flags": 6}
 
 
 class Params(NamedTuple):
-    """What is fixed for a design: the records of the ring."""
+    """The constants of a design: the records of the ring."""
 
     records: int
 

@@ -11,7 +11,7 @@ from ..requirements import EDGE_ERROR_COUNTS, AxisRequirements
 from .design import Design
 
 USUAL = {"jerk_max_m_per_s3": None, "edge_error_max_counts": EDGE_ERROR_COUNTS, "passivity": False, "coupling": False}
-"""What is no fact of an axis unless it is another than this."""
+"""Fields that are facts of an axis only if they differ from these defaults."""
 
 
 @dataclass(frozen=True, kw_only=True)

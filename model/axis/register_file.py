@@ -68,7 +68,7 @@ class Area(IntEnum):
 
 
 class Operation(IntEnum):
-    """What a register file does at a request; the first four are the phases of a frame, in their order."""
+    """The operations of a register file; the first four are the phases of a frame, in their order."""
 
     CHECK_READ = 0
     CHECK_WRITE = 1
@@ -80,7 +80,7 @@ class Operation(IntEnum):
 
 
 class Source(IntEnum):
-    """What the chain is loaded with before the cell of a status; the chain's lowest bits are taken first.
+    """The source that loads the chain before a status's cell; the chain's lowest bits are taken first.
 
     The numbers suit the chain's logic. The two upper bits are alike and choose between the lower two and the upper two
     sources; the lowest bit chooses one of the two.
@@ -93,7 +93,7 @@ class Source(IntEnum):
 
 
 class Design:
-    """What the register file of a map holds.
+    """The content of a map's register file.
 
     Attributes:
         registers: the map.
@@ -151,9 +151,9 @@ class Design:
     def _moves(moved: list[tuple[Register, int]]) -> dict[int, int]:
         """Return the LEAST cells of values that pass through the chain one after the other, with their sources.
 
-        A cell has four parts: the bits that its register takes; half the address of the next cell, or 0 after the last;
-        the source with which the chain is loaded before; and `EXTENDED`. The low half of a value comes first, so that
-        odd and even addresses take turns.
+        A cell has four parts: the bits of its register; half the address of the next cell, or 0 after the last; the
+        source that loads the chain before; and `EXTENDED`. The low half of a value comes first, so that odd and even
+        addresses take turns.
         """
         cells, following = {}, 0
         for register, source in reversed(moved):

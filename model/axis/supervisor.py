@@ -88,7 +88,7 @@ def names(causes: int) -> list[str]:
 
 
 class Params(NamedTuple):
-    """What is fixed for a design."""
+    """The constants of a design."""
 
     ramp_fraction: int  # fraction bits of the ceiling
     pump_clocks: int  # clocks for which `alive` keeps a level

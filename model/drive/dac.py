@@ -36,9 +36,9 @@ class Stage(stage.Stage):
     """A serial DAC.
 
     Attributes:
-        amplifier: what follows the DAC; its full scale is that of the code -2**(bits - 1).
+        amplifier: the amplifier after the DAC; its full scale belongs to the code -2**(bits - 1).
         bits: bits of the code.
-        coding: how a code is written.
+        coding: the coding of a code's value.
         header_bits, header: the bits before the code, and their number.
         trailing_bits: the zeros behind it.
         mode: mode of the SPI. The serial clock rests low in the modes 0 and 1, high in 2 and 3. A bit is taken at the
@@ -82,7 +82,7 @@ class Params(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What the block sees just before a clock edge; `strobe` comes with a new drive."""
+    """The block's inputs just before a clock edge; `strobe` comes with a new drive."""
 
     strobe: int = 0
     magnitude: int = 0
@@ -91,7 +91,7 @@ class Inputs(NamedTuple):
 
 
 class State(NamedTuple):
-    """What the block keeps.
+    """The block's state.
 
     Attributes:
         ready: the axis was ARMED at the last edge.

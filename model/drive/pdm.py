@@ -40,7 +40,7 @@ class Params(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What the block sees just before a clock edge."""
+    """The block's inputs just before a clock edge."""
 
     magnitude: int = 0
     negative: int = 0

@@ -18,7 +18,7 @@ UNITS: tuple[Unit, ...] = get_args(Unit)
 
 @dataclass(frozen=True, kw_only=True)
 class Amplifier:
-    """What stands between a stage's pins and the force on the handle.
+    """The amplifier between a stage's pins and the force on the handle.
 
     Attributes:
         unit: V if the stage sets volts, A if the amplifier makes amperes of them.
@@ -57,7 +57,7 @@ class Amplifier:
 
 @dataclass(frozen=True, kw_only=True)
 class Stage(ABC):
-    """What an axis is to have as its drive stage.
+    """The specification of an axis's drive stage.
 
     Attributes:
         amplifier: what is behind it.

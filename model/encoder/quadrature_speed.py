@@ -50,7 +50,7 @@ def glitch_clocks_for(edges_per_clock: float, edge_error: float = 0.0) -> int:
     The shortest level at that rate r lasts (2 - 2 `edge_error`) / r clocks and must be at least glitch_clocks + 1
     clocks long: see `max_edge_rate`. The result is 0 where not even one clock can be filtered, and otherwise at most
     `GLITCH_CLOCKS_MAX`. Pulses up to that length then change nothing. Without a filter, every pulse that a clock sees
-    is counted forth and back: its stamps are those of an encoder that moves two edges in the length of the pulse.
+    is counted forth and back: its stamps look like an encoder moving two edges in the length of the pulse.
     """
     level_clocks = (2 - 2 * edge_error) / (SPEED_MARGIN * edges_per_clock)
     # A level of a whole number of clocks may be computed a rounding short.

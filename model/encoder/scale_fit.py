@@ -10,11 +10,11 @@ with the least sum of squares, over all passes:
 The errors are eliminated bin by bin, and the coefficients of the splines are the solution of what is left. Nothing but
 stamps and numbers is used, and no order of passes matters.
 
-What cannot be told. An error that a spline can follow, as a function of the time of a pass, may be motion or error: a
-constant, a term proportional to n, and a wave so long that it passes below about 1 / (2 knot_s) Hz in all passes.
-RIDGE, which is far less than one edge, gives that part to the motion: a map keeps the mean and the scale of the
-encoder. In turn, motion of the hand above that frequency is taken for an error of the scale. It differs in every pass,
-so it falls with the number of passes.
+What cannot be told. If a spline can follow an error as a function of the time of a pass, the error cannot be told from
+motion. Such errors are a constant, a term proportional to n, and a wave so long that it passes below about 1 / (2
+knot_s) Hz in all passes. RIDGE, which is far less than one edge, gives that part to the motion: a map keeps the mean
+and the scale of the encoder. In turn, motion of the hand above that frequency is taken for an error of the scale. It
+differs in every pass, so it falls with the number of passes.
 
 Source: the splines are de Boor 1978, A Practical Guide to Splines, chapter X; least squares with the many unknowns of
 their own elimination are the bundle adjustment of photogrammetry. Their use on an encoder's edges is this project's.

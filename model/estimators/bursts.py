@@ -52,7 +52,7 @@ LATENCY = 3
 
 
 class Limits(NamedTuple):
-    """What the watch compares with: bits of count and stamp; clocks of three edges, and of a silence; samples."""
+    """The limits of the watch: bits of count and stamp; clocks of three edges, and of a silence; samples."""
 
     count_width: int
     stamp_width: int
@@ -66,8 +66,8 @@ class Watch(NamedTuple):
     """The state: the last sample, and the edges and counts before the ones that are judged.
 
     `stamp`, `edge` and `count` are of the last sample, `quiet` is the age of its last edge. `silence` and `base` are
-    the quiet and the count before the edges of the last `window` samples. `events` is the number of jolts that count,
-    `left` the number of samples for which they are still remembered. Ages are cut off at what every jolt has.
+    the quiet and the count before the edges of the last `window` samples. `events` is the number of remembered jolts,
+    `left` the number of samples for which they stay remembered. Ages are cut off at what every jolt has.
     """
 
     running: int

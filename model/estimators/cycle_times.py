@@ -76,8 +76,8 @@ def observe(params, memory, seen, restart):
     right_age = (seen.stamp - stamp_of(seen, right)) & modulus
     left_known, right_known = fresh >> left & 1, fresh >> right & 1
 
-    # The two kinds next to the last edge's are those of the edge before it and of the edge three before it; the ages
-    # tell which is which.
+    # The two kinds next to the last edge's belong to the edge before it and to the edge three before it. The ages tell
+    # which is which.
     left_first = left_known and not (right_known and right_age < left_age)
     before = left_age if left_first else right_age
     run = seen.run if fresh >> kind & 1 else 0

@@ -12,12 +12,11 @@ passed, 0 if the same edge is crossed back. x is the distance of the axis from i
 and at every sample, s clocks after the last edge, u = v + a s; this line is the output, `u`. A sample takes its last
 edge alone: where edges come faster than samples, T is the time between edges in use.
 
-The gains are those of the steady-state Kalman filter for a white jerk and for edges displaced at random. M is its
-memory: the time in which the past fades by e. For T far below M, K_x = 2 T / M, K_v = 2 T / M**2 and K_a = T / M**3.
-From T = 2 M on, the gains stay at their values for 2 M, about those of a fit to the last three edges. So the filter is
-a mean over many edges where they are dense, and a second difference of edges where they are rare. Gains come from a
-table, by the top two bits of T and by the level of the memory. They need no precision, only an error of the same sign
-everywhere.
+The gains are the steady-state Kalman filter's for a white jerk and for edges displaced at random. M is its memory: the
+time in which the past fades by e. For T far below M, K_x = 2 T / M, K_v = 2 T / M**2 and K_a = T / M**3. From T = 2 M
+on, the gains stay at their values for 2 M, about the gains of a fit to the last three edges. So the filter is a mean
+over many edges where they are dense, and a second difference of edges where they are rare. Gains come from a table, by
+the top two bits of T and by the level of the memory. They need no precision, only an error of the same sign everywhere.
 
 The memory. Two bounds on the motion give a quiet and an agile memory: the jerk between impacts, and the acceleration at
 an impact (`edge_kalman_design` has the rule). The quiet memory is used until |z| passes a bound: ALARM standard
@@ -47,8 +46,8 @@ Start. The first sample, and a sample with `restart`, forget everything; u = 0 u
 is caught up in some agile memories.
 
 Saturation. v and u saturate at the velocity format (flag `velocity_saturated`); the distance and r saturate at the
-error's format (flag `error_saturated`). The place is then that of the last edge, and the next edges recover a motion
-within the format. The acceleration saturates silently: as a limit it is part of the law, in float64 too. z is a mean of
+error's format (flag `error_saturated`). The place is then the last edge's, and the next edges recover a motion within
+the format. The acceleration saturates silently: as a limit it is part of the law, in float64 too. z is a mean of
 innovations and within their range.
 
 Limits. The count and the stamp may wrap: differences are modulo their widths. An interval of half the stamp's range or
@@ -90,7 +89,7 @@ TOP = AGILE_LEVEL << LEVEL_BITS
 HALF = 1 << (LEVEL_BITS - 1)
 BLEND_BITS, KX_BITS = WIDTHS[BLEND], WIDTHS[KX]
 ANCHOR, FIRST, TIMED = range(3)
-"""What the last edge is: the anchor itself, the first known edge, or an edge to correct by."""
+"""The kind of the last edge: the anchor itself, the first known edge, or an edge to correct by."""
 
 
 @compiled

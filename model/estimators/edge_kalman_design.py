@@ -1,6 +1,6 @@
 """Gains, formats, tables and state of `edge_kalman`, derived from the axis; `edge_kalman` defines the law.
 
-The symbols T, M, r, v, a and D are those of `edge_kalman`; q is a count, s the error of an edge (counts), J and C the
+`edge_kalman` defines the symbols T, M, r, v, a and D. q is a count, s the error of an edge (counts), J and C are the
 bounds on jerk and acceleration. Times are in units of 2**`unit` clocks, 1 clock unless the stamp has more than
 TIME_BITS bits; D is then the units in a sample.
 
@@ -11,9 +11,9 @@ acceleration. At each of the two memories, this change is a constant share of th
     J M_quiet**3 = QUIET s q sqrt(T / M_quiet)            C M_agile**2 = AGILE s q sqrt(T / M_agile)
 
 and M_agile is at most M_quiet. s combines the bound on an edge's error and, independent of it, the stamp's error at the
-largest speed. LEVELS memories are used, with equal ratios from one to the next. Their gains are those of the steady
-state at constant T (`riccati`), for a bandwidth of T / M a sample. QUIET, AGILE, ALARM and GROWTH were chosen by
-measurement, with the impact's C and the jerk of the paper's swing, and are the same for every axis.
+largest speed. LEVELS memories are used, with equal ratios from one to the next. Their gains belong to the steady state
+at constant T (`riccati`), for a bandwidth of T / M a sample. QUIET, AGILE, ALARM and GROWTH were chosen by measurement,
+with the impact's C and the jerk of the paper's swing, and are the same for every axis.
 
 A row of the table is for a level and the top two bits of T. It is computed for the M and T in the middle of the row, at
 most a fifth off. K_v T and K_a T**2 are then too large by up to 1.22 and 1.5 at the row's longest T. The filter
@@ -21,8 +21,8 @@ tolerates this for T up to 2.6 M, and diverges from 2.8 M on. For ever rarer edg
 = 1.73 and K_a T**2 = 1.49. The last three edges give 1.5 and 1. So the gains are limited to those at T / M = INDEX_MAX,
 1.46 and 1.08. The columns are words of fixed formats, whose range follows from the largest entry:
 
-- `blend` UQ(0, 16): the share of r that the mean of r takes; `alarm`: the bound on that mean; `fall` UQ(2, 16): the
-  levels by which the memory grows over T;
+- `blend` UQ(0, 16): the share of r in the mean of r; `alarm`: the bound on this mean; `fall` UQ(2, 16): the growth of
+  the memory over T, in levels;
 - `kx` UQ(0, 18), `kv` of 20 bits and `ka` of 24: the gains. Each resolves its smallest entry, at the shortest T and the
   longest memory, to a few bits: an error of an eighth in a gain has almost no effect.
 

@@ -213,7 +213,7 @@ def observe(params, edges, seen, restart):
         moved = 0
     elif passed:
         moved, down, time = min(abs(between), params.edges_max), int(between < 0), passed
-    # An edge that comes after so long a silence, in a motion so fast, shows that edges come in bursts.
+    # An edge after so long a silence, in so fast a motion, shows that edges come in bursts.
     doubt = max(edges.doubt - 1, 0)
     if not known:
         doubt = 0

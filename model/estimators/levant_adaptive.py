@@ -75,7 +75,7 @@ Formats are as in `levant_semi_implicit`, except:
 - f, the fraction bits of b, u and u1: alpha at the last level has at least LEAST_ALPHA_BITS below its top bit. Its
   shift rounds down, and so changes it by at most 2**-LEAST_ALPHA_BITS. The position budget holds for lambda at the last
   level. The product of lambda and root is shifted by the level without loss, and then rounded. At odd levels the root
-  is that of half the radicand, so delta = lambda_j sqrt(2) 2**-(root.f+1) + 2**-(f+1) there.
+  is taken of half the radicand, so delta = lambda_j sqrt(2) 2**-(root.f+1) + 2**-(f+1) there.
 - `elapsed` and `calm` stop once they can change no decision, so they cannot overflow. The thresholds follow the
   designed gains, not those set at run time; at the first sample j is 0.
 - A single rounding may decide a loss, so fixed-point and real trajectories diverge. Below 1 MHz the RMS of a single

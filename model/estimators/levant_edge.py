@@ -30,8 +30,8 @@ error that an axis makes reaches them.
 
 The places of edges. On a real scale the four kinds of edges (by pin and polarity, in the upward sense) are out of place
 by up to half a count. `place` holds the displacements, times D. After a full cycle in one direction, an edge moves two
-places apart by E 2**-LEARN_SHIFT: that of its own kind and that of the last edge's kind. |E| is limited to D/4 to D/2
-for this. One of the four unknowns is the origin, which the symmetric step does not move. Steady speed excites two
+places apart by E 2**-LEARN_SHIFT: the places of its own kind and of the last edge's kind. For this, |E| is limited to
+D/4 to D/2. One of the four unknowns is the origin, which the symmetric step does not move. Steady speed excites two
 patterns of a cycle. For these, the loop from places over v and a to E is 2 and (1 + j) / (1 - g/2). Its real part is
 positive, so learning is stable with any step less than 1/4. It takes some ten cycles. (With g = 1, and v corrected by a
 as well, it is not stable: see the table.) The residual of an interval cut by k bits is weighted by 2**-k: slow motion
@@ -140,7 +140,7 @@ def within(line, velocity, bound):
 
 @compiled
 def refuted(bound, before, after):
-    """Return whether a velocity at an edge is larger than the bound before this edge allows: edges come in bursts.
+    """Return whether a velocity at an edge exceeds the last bound: edges come in bursts.
 
     Without bursts an axis that slows down within its cell is no faster at the next edge than `bound` less its speed
     `before`. One that stops in it and starts again is slower than half of that speed.

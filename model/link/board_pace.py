@@ -133,8 +133,8 @@ class Told:
     def __init__(self, port: str):
         self._pace, self._lock = 1.0, threading.Lock()
         self._line: socket.socket | None = None
-        # Without a virtual board there is nobody to be heard, and no such socket but on Linux; a board that stands will
-        # not answer anything else either.
+        # Without a virtual board no pace is told, and only Linux has such sockets. A stopped board does not answer
+        # other requests either.
         with suppress(OSError, ValueError, AttributeError):
             self._line = _socket()
             self._line.settimeout(FIRST_S)

@@ -26,7 +26,7 @@ COUNTED = {16: 6, 23: 10}
 
 
 class Verdict(IntEnum):
-    """What a frame was."""
+    """The verdict on a frame."""
 
     SPOILT = 0  # the CRC is bad, a stop bit was low, it is too long, or it ended too early
     OVERRUN = 1  # bytes came while an answer was under way

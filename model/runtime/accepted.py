@@ -1,4 +1,4 @@
-"""What an annotated type accepts, in words: of a key of a scene, and of an option of the command line."""
+"""The accepted values of an annotated type, in words: for a key of a scene, and for an option of the command line."""
 
 import types
 import typing

@@ -37,7 +37,9 @@ def build_dir() -> Path:
         try:
             return Path(chosen).expanduser().absolute()
         except RuntimeError:
-            raise BuildFolderError(f"HARDWALL_BUILD must not begin with a home that nobody has: {chosen!r}") from None
+            raise BuildFolderError(
+                f"HARDWALL_BUILD must not begin with the home of an unknown user: {chosen!r}"
+            ) from None
     root = Path(__file__).absolute().parents[2]
     if (root / "pyproject.toml").exists():
         return root / "build"

@@ -37,7 +37,7 @@ class KernelCache(_Cache):  # type: ignore[misc]
     def __init__(self, function: Callable, options: str):
         provenance.note(function.__module__)
         self._function, self._options = function, options
-        # A function that was made from a text has no source that a digest could follow.
+        # A function made from a text has no source for a digest to follow.
         self._enabled = provenance.is_in_its_file(function)
         name = re.sub(r"[^\w.-]", "", f"{function.__module__}.{function.__qualname__}")
         self._name = f"{name}-{function.__code__.co_firstlineno}"

@@ -127,7 +127,7 @@ def _within(seconds: float, do: Callable[[], object]) -> None:
             do()
         over.release()
 
-    # To start a `threading.Thread` takes locks, which the thread that was interrupted may have.
+    # Starting a `threading.Thread` takes locks, which the interrupted thread may hold.
     _thread.start_new_thread(run, ())
     over.acquire(timeout=seconds)
 

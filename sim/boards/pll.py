@@ -1,8 +1,8 @@
 """The PLLs of the parts: which clocks they make from a board's oscillator, and the Verilog that makes one.
 
 A clock is made exactly or not at all: every gain of an axis has its frequency in it. The ranges come from the vendors'
-data sheets, cited in `docs/reference/boards.md`. Among several ways to make a clock, the one with the fastest phase
-detector is taken, then the one with the oscillator (VCO) nearest to the middle of its range.
+data sheets, cited in `docs/reference/boards.md`. Among several ways to make a clock, the fastest phase detector is
+preferred, then the oscillator (VCO) nearest to the middle of its range.
 """
 
 from abc import ABC, abstractmethod
@@ -131,7 +131,7 @@ class Ehxplll(Pll):
                     yield Setting(vco / clkos, compared, vco, named)
 
     def cell(self, oscillator_hz: int, setting: Setting) -> str:
-        # A phase of its divider less one is that of an output without a shift.
+        # An output without a shift has the phase of its divider less one.
         numbers = dict(setting.dividers)
         numbers |= {f"{name}_CPHASE": numbers[f"{name}_DIV"] - 1 for name in ("CLKOP", "CLKOS")}
         off = ("PLLRST_ENA", "INTFB_WAKE", "STDBY_ENABLE", "DPHASE_SOURCE")

@@ -52,7 +52,7 @@ def top_of_axes(board: Description, clock_hz: int, axes: int) -> str:
 
 
 class Made(NamedTuple):
-    """What a `top` was made for.
+    """The board, clock and drive of a `top`.
 
     Attributes:
         board: the title of the board.
@@ -77,7 +77,7 @@ def drive_of_axes(axes: int) -> str:
 
 
 class Top(NamedTuple):
-    """What `top` is made of.
+    """The parts of a `top`.
 
     Attributes:
         board: the board.

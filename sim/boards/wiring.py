@@ -1,4 +1,4 @@
-"""What to connect to a board, as a page of Markdown: every signal, its pins, its level, and what to see of it."""
+"""The wiring of a board, as a page of Markdown: every signal, its pins, its level, and how to check it."""
 
 from collections.abc import Iterable
 

@@ -32,7 +32,7 @@ def edges_of(signal: signals.Signal, spec: AxisSpec, offsets, scale=None, lines=
     passed = encoded_signal(signal, spec, offsets, scale, lines)
     within = np.array(STEPS)[np.append(passed.start_level, passed.edges.levels)]
     up = (np.diff(within) + 1) % 4 - 1
-    # Going up the edge is that of the new cell, going down that of the old one.
+    # Going up, the edge belongs to the new cell; going down, to the old one.
     return passed.edges.clocks / spec.clock_hz, np.cumsum(up) + (up < 0).astype(float)
 
 

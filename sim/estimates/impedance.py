@@ -1,4 +1,4 @@
-"""What stiffness and damping a wall renders to a handle that is moved sinusoidally inside of it, by frequency.
+"""The stiffness and damping that a wall renders to a handle in sinusoidal motion inside it, by frequency.
 
 With x = c + A sin wt, the push is projected on both parts of the motion over a window of whole periods:
 

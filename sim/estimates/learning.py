@@ -76,6 +76,8 @@ def check(passes: int, estimator: str, backend: str) -> None:
     if isinstance(passes, bool) or not isinstance(passes, int) or not 1 <= passes <= PASSES_MAX:
         raise ValueError(f"encoder.learned_passes must be a whole number from 1 to {PASSES_MAX}, not {passes!r}")
     if estimator != ESTIMATOR:
-        raise ValueError(f"encoder.learned_passes must be for {ESTIMATOR}, which takes a map, not for {estimator!r}")
+        raise ValueError(
+            f"encoder.learned_passes must be for {ESTIMATOR}, which takes a map of the scale, not for {estimator!r}"
+        )
     if backend == "rtl":
         raise ValueError("encoder.learned_passes must be on float or fixed: the RTL of an axis has no port for a map")

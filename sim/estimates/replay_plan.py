@@ -1,4 +1,4 @@
-"""What a replay runs: the checks of its arguments, the reference, the bound C and the axis, before anything is run.
+"""The plan of a replay: the checks of its arguments, the reference, the bound C and the axis, before anything is run.
 
 The bound C on the acceleration, from which an estimator gets its gains, is computed by `reference` unless it is given.
 A recording that hardly accelerates gets a C that moves one count over its whole length: the counts cannot distinguish
@@ -128,7 +128,7 @@ def _check_edges(recording: Recording, edges: EdgeRecord) -> None:
 
 
 class Plan(NamedTuple):
-    """What is derived from a recording before its counts are run.
+    """The values derived from a recording before its counts are run.
 
     Attributes:
         counts: the counts that the estimator sees.

@@ -1,4 +1,4 @@
-"""What a replay sets of its axis beyond C: the gains, the bound on the jerk, and the error of single edges.
+"""The settings of a replay's axis besides C: the gains, the bound on the jerk, and the error of single edges.
 
 Everything is in recorded counts and true seconds, by the keys that a scene has with metres: `gains.ESTIMATOR.NAME`,
 `jerk_max_counts_per_s3` and `edge_error_max_counts` of its section `controller`. An axis counts in samples: see

@@ -179,7 +179,7 @@ def _check_scheduler(address: str) -> None:
     except Exception as error:
         raise RuntimeError(f"no Dask scheduler answers at {address}: {_why(error)}") from None
     if kind != "Scheduler":
-        raise RuntimeError(f"no Dask scheduler answers at {address}: what answers is no scheduler")
+        raise RuntimeError(f"no Dask scheduler answers at {address}: the server there is no scheduler")
 
 
 def _why(error: BaseException) -> str:

@@ -86,7 +86,7 @@ def are_as_they_were() -> bool:
     now_ns = time.time_ns()
     for path in _names():
         try:
-            # This time cannot be set by hand. One in the future is that of another clock.
+            # This time cannot be set by hand. A time in the future comes from another clock.
             written = sim.BEGAN_NS < os.stat(path).st_ctime_ns <= now_ns
         except OSError:
             written = True

@@ -42,7 +42,7 @@ COLOURS = 64
 
 @dataclass
 class _Side:
-    """What moves on one side: parts of the handle with their offsets (mm) from its front, curves, and the verdict."""
+    """The moving parts of one side: parts of the handle by their offsets (mm) from its front, curves, the verdict."""
 
     hit: Hit
     parts: list[tuple[Rectangle | Line2D, float]]

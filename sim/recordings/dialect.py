@@ -1,4 +1,4 @@
-"""What a text file looks like: its comments, its separator, its decimal comma, and whether a line names its columns.
+"""The form of a text file: its comments, its separator, its decimal comma, and whether a line names its columns.
 
 The rules, in this order:
 
@@ -24,11 +24,11 @@ from .capture import hertz_of
 
 COMMENT = re.compile(r"\s*(?:#|%|//)")
 COMMENT_ABOVE = re.compile(r"\s*(?:#|%|//|; )")
-"""What a comment begins with, everywhere and above the first row."""
+"""The beginnings of a comment: everywhere, and above the first row."""
 NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)", re.IGNORECASE)
 ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:[.,]\d+)?)?(?:Z|[+-]\d\d:?\d\d)?")
 NOTHING = re.compile(r"[-?.*]+|n\.?/?a\.?|none|null|nil|missing", re.IGNORECASE)
-"""What programs write in place of a number that they do not have."""
+"""The texts that programs write in place of a missing number."""
 DECIMAL_COMMA = re.compile(r"\d,\d|(?:^|[\s;+-]),\d")
 _CHANNELS = re.compile(r"\W*channels?\s*\(\d+/\d+\)\s*:\s*(.+)", re.IGNORECASE)
 _RATE = re.compile(r"\W*sample ?rate\s*:\s*(.+)", re.IGNORECASE)

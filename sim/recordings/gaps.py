@@ -118,7 +118,7 @@ def grid_of(name: str, times: Times, counts: np.ndarray, rule: str, rate_hz: flo
     passed = passed_in(steps, times.resolution, rate_hz)
     if passed.sum() >= SAMPLES_MAX:
         raise RecordingError(
-            f"{name}: must have at most {SAMPLES_MAX} samples with those that are missing, not {passed.sum() + 1:.0f}: "
+            f"{name}: must have at most {SAMPLES_MAX} samples, missing ones included, not {passed.sum() + 1:.0f}: "
             "give --gaps split"
         )
     numbers = np.concatenate([[0], np.cumsum(passed.astype(np.int64))])

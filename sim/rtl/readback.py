@@ -1,4 +1,4 @@
-"""What a packer wrote, read back and held against what nextpnr has placed and routed.
+"""The readback of a bitstream, compared with the placed and routed design of nextpnr.
 
 Of an iCE40 every bit of every tile is compared. The unpackers of the others write a configuration in other words than
 nextpnr does, for a default may be said or left out. Of these it is the part, the contents of every logic cell that has
@@ -14,7 +14,7 @@ from ..boards.description import Description
 from .tools import SynthesisError
 
 Facts = dict[str, str]
-"""What is compared, by name or place."""
+"""The compared facts, by name or place."""
 CONSTANT = {"0" * 16, "1" * 16}
 """Contents of a logic cell without a function: a cell that is not used has one of these."""
 UNTOLD_ECP5 = re.compile(

@@ -1,4 +1,4 @@
-"""What may run while all else of a component rests: a check of its netlist, which allows a simulation to skip clocks.
+"""Counters that run while the rest of a component rests: a check of its netlist, so that a simulation skips clocks.
 
 Between two samples an axis does nothing but count clocks. A simulation that knows so may leave these clocks out, and
 add their number to the counters. `check` examines Amaranth's netlist, from which the Verilog is written. It finds
@@ -28,9 +28,9 @@ unless the constant is just that value: so the value below a constant is a stop,
 nothing that is looked at follows from them.
 
 A simulation has to see these clocks each time; what it then skips is exact. If the check fails, nothing is skipped. It
-may keep more than registers from clock to clock, as Verilator does: what follows from them. All of this is compared. A
-value that follows from a counter is either its successor, which differs from clock to clock, or the bit of a stop,
-which is the same at both ends of the skipped clocks.
+may keep more than registers from clock to clock, as Verilator does: what follows from them. All of this is compared.
+Two values follow from a counter. Its successor differs from clock to clock. The bit of a stop is the same at both ends
+of the skipped clocks.
 """
 
 from collections.abc import Iterable

@@ -30,7 +30,7 @@ FAST_TO_RUN, FAST_TO_BUILD = "-O3", "-O1"
 
 @dataclass(frozen=True)
 class Recipe:
-    """What a shared library is made of.
+    """The parts of a shared library.
 
     Attributes:
         files: the sources by file name; those that end in .v are the hardware.

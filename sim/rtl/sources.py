@@ -17,7 +17,7 @@ from .bitstream import pages
 from .flow import around
 
 WAIVERS = Path(__file__).with_name("lint.vlt")
-"""What `verilator -Wall` finds in the style of the Verilog, and why it is waived."""
+"""The style warnings of `verilator -Wall` on the Verilog, and why they are waived."""
 VERILOG = {".v", ".sv"}
 """How the names of Verilog end, in small letters."""
 LONGEST = 1000

@@ -23,7 +23,7 @@ MODULES_OF_PERL = "-MFindBin", "-MPod::Usage"
 
 
 READ_BY_TOOLS = frozenset("$:#%;&|<>()[]{}*?!~^`'\"\\")
-"""What make, the shell or ccache reads in a path as something else than a letter; so they do every kind of space."""
+"""Characters of a path with a meaning to make, the shell or ccache; every kind of space has one, too."""
 
 
 class BuildError(RuntimeError):

@@ -140,7 +140,7 @@ def tool_of(scene: Scene, backend: str) -> Tool:
     position, surface = words["wall_position"], words["wall_velocity"]
     exact = is_exact(backend)
     estimate = spec.design.estimator.velocity.lsb if exact else 1.0
-    # What acts on the tool is what acts on the handle: the words' values, where the axis has words.
+    # The tool feels the same values as the handle: the words' values, if the axis has words.
     gains = {"wall_stiffness": coupling.stiffness_n_per_m, "wall_damping": coupling.damping_n_s_per_m}
     if exact:
         gains = {name: words[name].to_si(scene.words[name]) for name in gains}
@@ -179,8 +179,8 @@ def sweep_of(scene: Scene, world: World, controller: object) -> Sweep | None:
     latency = quadrature.latency(controller.glitch_clocks)
     clocks = timing.clocks_per_sample - timing.latency - latency
     closest_m = scene.encoder.closest_counts * spec.count_m
-    # An edge that is decoded before the next one has been seen is the only one under way; and edge by edge, a sample
-    # would not have so many that some are lost.
+    # If each edge is decoded before the next one is seen, only one edge is under way. Edge by edge, a sample would not
+    # have so many that some are lost.
     apart_s = max((latency + 1) / spec.clock_hz, 4 / EDGE_CAPACITY / spec.sample_hz)
     least, most = spec.count_m * spec.sample_hz, closest_m / apart_s
     if clocks < 1 or least >= most:

@@ -96,7 +96,7 @@ def content_of_scene(scene: str, text: str) -> dict[str, Any]:
     except ValueError as error:
         raise SceneError(f"{scene}: must be a readable TOML file: {error}") from None
     if "name" in content:
-        raise SceneError(f"{scene}: name is not a key of a scene: its file has its name")
+        raise SceneError(f"{scene}: name is not a key of a scene: the name of the file is the scene's name")
     return content
 
 

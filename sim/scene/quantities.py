@@ -28,7 +28,7 @@ def whole(least: int, most: int) -> Any:
 
 
 MARGIN = 1 + 1e-12
-"""What a computed limit is multiplied by, for the last bits of its products: a limit of few digits is accepted."""
+"""The factor on a computed limit, for the last bits of its products: so a limit written with few digits is accepted."""
 
 
 def rounded_down(limit: float) -> str:

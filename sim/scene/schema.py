@@ -101,8 +101,8 @@ class WallSection(Section):
 
 
 class PassivitySection(Section):
-    """An observer of the energy that the drive gives to the handle, and a controller that damps by at most this much
-    while more energy was given than taken: see `hardwall.model.axis.passivity`."""
+    """An observer of the energy that the drive gives to the handle, and a controller. While more energy was given than
+    taken, the controller damps by at most this much: see `hardwall.model.axis.passivity`."""
 
     damping_n_s_per_m: or_none(Damping)
 
@@ -221,7 +221,7 @@ class Scene(Section):
 
     @property
     def held_by(self) -> WallSection | CouplingSection:
-        """What the axis renders a spring and a damper of: the wall, or the coupling to a tool that touches the wall."""
+        """The spring and damper that the axis renders: the wall, or the coupling to a tool that touches the wall."""
         return self.wall if self.coupling is None else self.coupling
 
     @property

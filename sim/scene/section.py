@@ -1,4 +1,4 @@
-"""What every section of a scene is."""
+"""The base of every section of a scene."""
 
 from pydantic import BaseModel, ConfigDict
 

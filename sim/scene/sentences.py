@@ -1,4 +1,4 @@
-"""What is wrong with a scene, in words."""
+"""The faults of a scene, in words."""
 
 import difflib
 import types

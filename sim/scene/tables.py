@@ -25,7 +25,7 @@ from .several import ABSENT, AxesScene, AxisScene, shared
 NAME = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
 Content = dict[str, Any]
-"""What a scene's file says, by section and key."""
+"""The content of a scene's file, by section and key."""
 
 
 def load_any(scene: str, changes: dict[str, Any] | None = None) -> Scene | AxesScene:
@@ -128,9 +128,9 @@ def _change(scene: str, content: Content, tables: dict[str, Content], changes: d
     for key in [key for key in changes if key not in of_all]:
         name, _, own = key.removeprefix(AXIS).removeprefix(".").partition(".")
         if name not in tables:
-            raise SceneError(f"{scene}: {shown(key)} is of no axis of this scene: they are {', '.join(tables)}")
+            raise SceneError(f"{scene}: {shown(key)} names no axis of this scene: its axes are {', '.join(tables)}")
         if not own:
-            raise SceneError(f"{scene}: {shown(key)} must go on with the key of a scene")
+            raise SceneError(f"{scene}: {shown(key)} must be followed by a key of a scene")
         _check_own(scene, name, tuple(own.split(".")))
         put(tables[name], scene, own, changes[key])
 

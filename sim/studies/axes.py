@@ -1,4 +1,4 @@
-"""What several axes in one pipeline take of a part, and how fast each of them is, against their number."""
+"""The resource use and the rate of several axes in one pipeline, against their number."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -17,7 +17,7 @@ NUMBERS = (1, 2, 4, 8, 16, 32)
 
 
 class AxesCosts(Rows):
-    """What axes take and how fast they are: rows of `cost`."""
+    """The resource use and the rate of axes: rows of `cost`."""
 
     def tables(self) -> list[Table]:
         """Return a table for every kind of axes."""

@@ -29,7 +29,7 @@ COCOTB_SAMPLES = 2000
 
 def _parts(sample_s: float) -> dict[str, dict]:
     """Return changes that each give a scene one optional part, too slight to alter the motion. Only the bristles are
-    not slight: they are about those of LuGre's paper. The last change has all parts that go together."""
+    not slight: they are about as in LuGre's paper. The last change has all parts that go together."""
     bare = {"handle.coulomb_n": None, "amplifier": None}
     cable = {"transmission.stiffness_n_per_m": 1e6, "transmission.damping_n_s_per_m": 10.0}
     motor = {"resistance_ohm": 2.0, "inductance_h": 3e-4, "torque_constant_n_m_per_a": 0.04}

@@ -202,7 +202,7 @@ def _searched(device: _Cases, sweep: dict[float, Map], unfiltered: Map, mapper: 
     maps = dict(sweep)
 
     def loss(log_cutoff: float) -> float:
-        # The cutoff that is tried is exactly the one that is printed.
+        # The cutoff is tried exactly as printed.
         cutoff_hz = float(f"{math.exp(log_cutoff):.4g}")
         if cutoff_hz not in maps:
             case = device.filtered(cutoff_hz)

@@ -1,4 +1,4 @@
-"""What the rate buys: maps from 1 kHz to 1 MHz, estimator and force at the same rate, and at the scene's own rates.
+"""The gain of a higher rate: maps from 1 kHz to 1 MHz, estimator and force at one rate, and at the scene's own rates.
 
 A rigid device flatters a fast loop. So the scene's device should have an amplifier and a cable; the limit of the linear
 loop without them, with either, and with both shows which of them ends the gain.
@@ -47,7 +47,7 @@ def at_rate(rate_hz: int) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Gain:
-    """What the rate buys with one method.
+    """The gain of a higher rate with one method.
 
     Attributes:
         label: label of the method.

@@ -1,4 +1,4 @@
-"""What a wall renders of what it is commanded: stiffness and damping by frequency, and rate-hardness at contact.
+"""The rendered against the commanded wall: stiffness and damping by frequency, and rate-hardness at contact.
 
 The handle is moved along a known path, so stability plays no part. The rendered values are those that an instrument on
 the handle would measure with an ideal drive. See `estimates.impedance` and `estimates.hardness` for the measures.

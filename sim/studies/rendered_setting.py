@@ -1,4 +1,4 @@
-"""What the wall of a scene renders with one estimator at one rate, and what theory expects of it."""
+"""The values that a scene's wall renders with one estimator at one rate, and the values expected by theory."""
 
 import math
 from collections.abc import Callable, Iterable

@@ -198,7 +198,7 @@ class Contest:
     Attributes:
         scene: the scene, with the grid of the maps.
         curves: the estimators, labelled as on the command line.
-        shortcuts: all shortcuts; `computed`: those of a model; `hardware`: those of the RTL.
+        shortcuts: all shortcuts; `computed`: a model's; `hardware`: the RTL's.
         refused: why the scene does not take a shortcut, by its label.
     """
 

@@ -92,7 +92,8 @@ def _searched(times_s, values, start, slowest, fastest) -> np.ndarray:
         return basis @ _amplitudes(times_s, values, rad_per_s) - np.pad(values, (0, basis.shape[1]))
 
     def derivatives(rad_per_s):
-        # Of the residual, but for what is in the span of the basis: of that the gradient has nothing (Kaufman 1975).
+        # The gradient of the residual outside the span of the basis; the part inside contributes nothing (Kaufman
+        # 1975).
         basis, sines = _basis(times_s, rad_per_s), len(rad_per_s)
         sine, cosine = np.split(_amplitudes(times_s, values, rad_per_s), 2)
         slopes = times_s[:, None] * (basis[: len(times_s), sines:] * sine - basis[: len(times_s), :sines] * cosine)

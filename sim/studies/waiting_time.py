@@ -76,7 +76,7 @@ def program_of(folder: Path) -> Path:
         ValueError: if there is none.
     """
     for place in PLACES:
-        # What cannot be looked at, as a name that is too long, is none.
+        # A path that cannot be examined, for instance with too long a name, is none.
         if os.path.exists(folder / place):
             return folder.absolute() / place
     raise ValueError(f"must be a checkout in which make tools has run, or an environment with hardwall, not {folder}")
@@ -163,7 +163,7 @@ def measure(text: str, against: Path | None, progress: Callable[[str], None]) ->
     for name, command in COMMANDS.items():
         values: list[list[float]] = [[], []]
         sides = programs
-        # The first run of those that find things kept is the one that keeps them.
+        # The first warm run fills the cache.
         untimed = int(not command.cold)
         for number in range(-untimed, command.rounds):
             progress(f"round {number + 1} of {command.rounds}: {name}")

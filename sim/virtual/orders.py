@@ -1,4 +1,4 @@
-"""What a person may do to a virtual board while it runs: hold and push the handle, cut a wire, stop the clock."""
+"""A person's orders to a running virtual board: hold and push the handle, cut a wire, stop the clock."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

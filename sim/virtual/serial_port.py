@@ -38,13 +38,13 @@ class Line:
         try:
             self._listener = None if tcp_port is None else socket.create_server((LOOPBACK, tcp_port), backlog=1)
         except OSError as error:
-            raise PortError(f"port {tcp_port} of {LOOPBACK} cannot be had: {os.strerror(error.errno)}") from None
+            raise PortError(f"port {tcp_port} of {LOOPBACK} cannot be opened: {os.strerror(error.errno)}") from None
         try:
             self._master, self._slave = pty.openpty()
         except OSError as error:
             if self._listener:
                 self._listener.close()
-            raise PortError(f"there is no pseudo-terminal to be had: {error.strerror or error}") from None
+            raise PortError(f"no pseudo-terminal can be opened: {error.strerror or error}") from None
         # The slave is kept open, so that the terminal stays when a host closes it.
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)

@@ -29,7 +29,7 @@ GRASP_S = 1e-3
 
 @dataclass
 class Hand:
-    """What the hand does: hold the handle somewhere, or push it, or both.
+    """The hand: it holds the handle somewhere, or pushes it, or both.
 
     Attributes:
         held_m: where it holds the handle; None: it does not.
@@ -49,7 +49,7 @@ class Hand:
 
 @dataclass(frozen=True)
 class Handle:
-    """What the handle does now: its position, velocity and the force of the amplifier on it."""
+    """The handle now: its position, velocity and the force of the amplifier on it."""
 
     time_s: float
     position_m: float
@@ -124,6 +124,6 @@ class VirtualBoard:
 
     @property
     def handle(self) -> Handle:
-        """What the handle does now."""
+        """The handle now."""
         motion, rate = self._progress.moment.motion, self.scene.spec.sample_hz
         return Handle(self._progress.sample / rate, motion[0], motion[1], self._progress.force_n - self._push_n)

@@ -9,7 +9,7 @@ from .zwidth import Map, interval
 
 
 class Move(NamedTuple):
-    """What differs between the edges of two maps.
+    """The difference between the edges of two maps.
 
     Attributes:
         area: the ratio of their areas.

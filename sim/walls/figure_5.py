@@ -13,8 +13,8 @@ Every fact has a shortfall: 0 if it holds, 1 if nothing of it is there, and betw
 - a region that should enclose others: the part of their area in the range that is outside it;
 - a sharp drop: the error of its place beyond `ABOUT`, and the missing fraction of half of the largest K a step before
   the drop; if the region has not ended, the last K over the largest;
-- 500 Hz that should go on: the fraction of the range by which it ends early; or, if it goes on too stiff, the fraction
-  by which K exceeds Levant's largest;
+- 500 Hz that should go on: the fraction of the range by which it ends early; if it goes on too stiff, the excess of K
+  over Levant's largest, as a fraction;
 - K that should rise and fall: a quarter for each rise or fall that is missing.
 """
 

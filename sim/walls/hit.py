@@ -82,7 +82,7 @@ class Hit(Summary):
 
     @property
     def verdict(self) -> str:
-        """What is said of the wall: `stable`, `unstable` or `undecided`. One that was never touched is not stable."""
+        """The verdict: `stable`, `unstable` or `undecided`. A wall that was never touched is not stable."""
         return self.judged if self.touched else UNSTABLE
 
     @property
@@ -200,7 +200,7 @@ class Hit(Summary):
 
 
 _compiled: set[Any] = set()
-"""What `_kinds` returned for the arguments of the loops that this process has compiled."""
+"""The results of `_kinds` for the arguments of the loops compiled in this process."""
 _compiling = threading.Lock()
 """Held by the thread that compiles: the others, whose loop may be the same, wait in silence."""
 

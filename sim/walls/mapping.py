@@ -37,7 +37,7 @@ class Effort(NamedTuple):
 
 
 class Mapper:
-    """What makes the maps of a study, and records their effort from its own beginning on.
+    """The maker of a study's maps; it records their effort from its own beginning on.
 
     Args:
         backend: one of `backends.BACKENDS`.
@@ -103,14 +103,16 @@ def verdict(
         RuntimeError: if the worker has other sources of the project.
     """
     if sources != store.sources():
-        raise RuntimeError(f"a worker, {platform.node()}, has other sources of hardwall, or versions of its tools")
+        raise RuntimeError(
+            f"a worker, {platform.node()}, has other sources of hardwall, or other versions of its tools"
+        )
     case, start = Case("", scene, text, changes), None if start is None else start_of(start)
     result = hit.run(case.hitting(*wall, start), backend, until_sure=True)
     if not result.touched:
         stiffness, damping = wall
         held = "" if case.scene.coupling is None else ", for its coupling holds it back or shakes it"
         raise NeverReached(
-            f"the handle did not reach the wall{held}: nothing is said of K {stiffness:g}, B {damping:g} "
+            f"the handle did not reach the wall{held}: no verdict on the wall K {stiffness:g}, B {damping:g} "
             f"with {case.scene.controller.estimator}"
         )
     return {

@@ -267,7 +267,7 @@ def train(device: Device, longest_s: float) -> Train:
         rest = reach**order / math.factorial(order + 1) / (1 - LEG_RATE / 2)
     free = equations(device)
     n = len(free.rates)
-    # Room for states that it lacks is within the tables, and that for more states behind them.
+    # The tables have room inside for states that it lacks, and room at the end for more states.
     extra = EXTRA if n > STATES else 0
     rows, places = ([*range(STATES), *range(first, first + EXTRA)][:n] for first in (QUANTITIES, COLUMNS))
     columns = [*places, ONE, COMMAND]

@@ -3,8 +3,8 @@
 It uses the same tables in steps of `step_s`; the last step before the command changes is the rest of the interval:
 
 - velocities, the motor's force, and what its shunt adds, change by their rates at the beginning of the step;
-- positions change linearly by the new velocities, and edges are passed on that line (if all edges were stamped at the
-  step's end, a handle that passes two in a step would make an illegal transition of the pins);
+- positions change linearly by the new velocities, and edges are passed on that line; otherwise a handle that passes two
+  edges in a step would make an illegal transition of the pins;
 - Coulomb friction is clamped: where a step would turn the handle, and friction could hold it, the handle rests; it
   breaks loose in the first step whose force exceeds friction;
 - the voltage is within its limits, or at one of them, for a whole step.

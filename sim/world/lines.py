@@ -31,7 +31,7 @@ ROUNDING = 1e-6
 
 
 class Lines(NamedTuple):
-    """What happens on the lines; times in seconds, infinite for never."""
+    """The effects on the lines; times in seconds, infinite for never."""
 
     jitter_s: float  # sigma
     late_s: float
@@ -46,7 +46,7 @@ class Lines(NamedTuple):
 
 
 class Waiting(NamedTuple):
-    """What a loop keeps of its lines from interval to interval, in arrays that `carry` writes to."""
+    """A loop's state of its lines from interval to interval, in arrays that `carry` writes to."""
 
     edges: Edges  # those of the loop: in go the edges that the handle passes, out come those of the pins
     toggles: Edges  # the clocks and lines of the toggles to come, in order

@@ -87,7 +87,7 @@ def test_figures_are_drawn(monkeypatch, capsys, tmp_path, figure):
         (["accuracy", "--encoder-phase-error", "2"], "phase_error_counts and duty_error_counts must leave each edge"),
         (
             ["accuracy", "--encoder-phase-error", "0.1", "--set", "encoder.phase_error_counts=0.1"],
-            "--encoder-phase-error must be absent beside --set encoder.phase_error_counts, which is the same",
+            "--encoder-phase-error must be absent beside --set encoder.phase_error_counts: both set the same error",
         ),
         (["accuracy", "--set", "handle.mass_kg=1"], "--set must be of an error of the encoder, encoder.KEY=VALUE, not"),
         (["accuracy", "--set", "encoder.count_m=1e-5"], "--set must be of an error of the encoder, encoder.KEY=VALUE,"),

@@ -97,7 +97,7 @@ def test_a_board_that_starts_later_runs_the_scene_that_was_read(monkeypatch, cap
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
-        (["/dev/hardwall-absent"], 1, "cannot be opened: there is none of that name"),
+        (["/dev/hardwall-absent"], 1, "cannot be opened: there is no such port"),
         (["/dev/hardwall-absent", "mhz"], 2, "SCENE, --estimator and --set are for `hardwall panel virtual`"),
         (["virtual", "nowhere"], 2, "nowhere"),
         (["virtual", "--baud", "9600"], 2, "--baud and --pace are for a board at a port, not for `hardwall panel virt"),
