@@ -1,7 +1,7 @@
 """The command line. Results go to stdout, everything else to stderr.
 
-The exit codes are 0, 1 for a failed run, 2 for bad input, 129 after SIGHUP, 130 after SIGINT, 143 after SIGTERM, and
-141 if stdout was closed early. This module imports nothing from an extra, so it can name a missing extra. It imports
+The exit codes are 0, 1 for a failed run, 2 for bad input, and 141 if stdout was closed early; 129 after SIGHUP, 130
+after SIGINT, 143 after SIGTERM. This module imports nothing from an extra, so it can name a missing extra. It imports
 nothing slow, because an interrupt gives a Python traceback until `main` handles signals.
 """
 

@@ -1,5 +1,4 @@
-"""The platform for which Verilog is written: no vendor's part; its attributes and files suit the tools of several
-vendors."""
+"""The platform of the written Verilog: no vendor's part; its attributes and files suit the tools of several vendors."""
 
 import re
 from typing import IO

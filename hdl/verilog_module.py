@@ -38,9 +38,8 @@ class VerilogModule(wiring.Component):
     ------
     OSError
         If a file cannot be read.
-    ValueError
-        If a port has the name of the clock or of the reset, two files have one name, a file is no UTF-8, or a file
-        includes itself.
+    ValueError If a port has the name of the clock or of the reset; if two files have one name; if a file is no UTF-8,
+        or includes itself.
     """
 
     def __init__(

@@ -15,7 +15,7 @@ has written since this one came; and the board did not answer."""
 LEASE_OBJECT, NAMED_OBJECT = 0x80, 4
 """The object of the identification that names the holder of the lease, and the kind of request for one object."""
 HOLD_S = 2.0
-"""The time for which a silent program keeps the lease: the largest value of the board's watchdog. So no other program
+"""The time after which a silent program loses the lease: the largest value of the board's watchdog. So no other program
 gets the lease while the board may still drive for this one."""
 NAME_MAX = 80
 """The most characters of a program's name."""
@@ -81,7 +81,7 @@ def name_of(peer: tuple[str, int], here: tuple[str, int]) -> str:
 
     Args:
         peer: the address and port of that end.
-        here: those of this end.
+        here: the address and port of this end.
     """
     with suppress(OSError, ValueError, IndexError):
         if process := _process_of(peer, here):

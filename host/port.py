@@ -30,7 +30,7 @@ BYTE_BITS, DEVICE_BITS = 10, 1500
 """Bits of a byte on the line; and the longest time in which a board prepares an answer, in bits: 6000 clocks of at
 least 4 a bit."""
 BRIDGE_S = 0.016
-"""The time for which a USB bridge holds received bytes back, by its driver's default."""
+"""The time in which a USB bridge holds received bytes back, by its driver's default."""
 MACHINE_S = 0.02
 """The longest delay of a request or an answer by this machine's scheduling."""
 BEAT_S = 0.15

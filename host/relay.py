@@ -22,9 +22,9 @@ IDLE_S = 1.0
 REST_S = 1.0
 """An incomplete request is dropped after this time: the loopback has no such pauses."""
 GRACE_S, BURST = 5e-3, 5
-"""The time for which the line waits for the next request of the lease holder, and how many times in a row. A beat has
-two requests, four if one is lost, and may follow another request of its program. Behind a USB bridge a request of
-another program in between would take 16 ms."""
+"""The waiting time of the line for the lease holder's next request, and how many times in a row. A beat has two
+requests, four if one is lost, and may follow another request of its program. Behind a USB bridge a request of another
+program in between would take 16 ms."""
 DEAF_S, RUBBISH_MAX = 0.1, 16
 """After bytes that are no request, a program is ignored for this time; after so many in a row it is disconnected. A
 program that sends only rubbish would otherwise take processor time from the lease holder and delay its beats."""

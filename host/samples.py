@@ -75,7 +75,7 @@ class Samples(Iterator[Sample]):
     Args:
         axis: the axis.
         rate_hz: samples a second.
-        seconds: the time for which samples are due, s; None: for ever.
+        seconds: the time in which samples are due, s; None: for ever.
 
     Attributes:
         rate_hz: as given.

@@ -39,10 +39,10 @@ class Axes(wiring.Component):
     keeps its words. After a reset every word, and its shadow, has its reset value (the wall is off); `word_ready` is
     low during the first rota, and what is written then is lost.
 
-    Faults: as of a single axis, for each axis alone. After an illegal transition, or if the encoder is too fast for the
-    decoder, the drive of the axis is zero from its next sample on until `clear_flags`. `drive_enable` low makes its
-    drive zero at the next clock; it stays zero until `drive_enable` has been high from the force to the drive of a
-    sample of an actuation. A sample raises `flags` with its drive.
+    Faults: as of a single axis, for each axis alone. After an illegal transition, or at a speed beyond the decoder, the
+    axis's drive is zero from its next sample on until `clear_flags`. `drive_enable` low makes its drive zero at the
+    next clock; it stays zero until `drive_enable` has been high from the force to the drive of a sample of an
+    actuation. A sample raises `flags` with its drive.
 
     Latency: `latency` clocks from a strobe to the changed drive, more than a rota if that is short; the decoder's
     latency from a pin to the strobe. Throughput: a sample of one axis or another every clock.

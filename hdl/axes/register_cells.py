@@ -24,7 +24,7 @@ class Cells:
         cell, write: the ports of the banks.
         text: the port of what never changes.
         area, window: what `text` is asked for: an area, and whether it is in the window.
-        shift, upper: the content of a cell, old or new; and the former content of `shift`.
+        shift, upper: the content of a cell, old or new; and the content of `shift` before.
         moments: when the status of an axis is taken.
         taking: by name, whether `shift` takes a cell, a text, a status, or the host's value.
     """

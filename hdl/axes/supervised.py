@@ -35,7 +35,7 @@ class SupervisedAxes(wiring.Component):
 
     Every axis has its own supervisor, with the promises of `hardwall.hdl.axis.supervisor.Supervisor`. It acts in the
     axis's turn, once a sample: what pins, host and decoder did since the last turn waits for it, and so do pulses of
-    the host. A turn looks `LOOK` clocks before the sample's drive is there, and decides a clock after the drive, with
+    the host. A turn looks `LOOK` clocks before the sample's drive is there. It decides a clock after the drive, with
     the monitors' causes of that very sample. So the drive of a faulty sample is never let out.
 
     Between the turns, zero is as near as for a single axis. A loop that opens makes the drive zero at the third clock

@@ -54,8 +54,8 @@ class Board(wiring.Component):
     ----------
     spec : hardwall.model.spec.AxisSpec
         The axis.
-    link : Link or AxiLink, optional The link to the host, with the registers of this axis, and so with a capture memory
-        of the size that these registers give, or none. Default: a serial line of 921 600 baud, or the highest rate that
+    link : Link or AxiLink, optional The link to the host, with the registers of this axis. The registers say how large
+        the capture memory is, or that there is none. Default: a serial line of 921 600 baud, or the highest rate that
         the clock allows, with the registers that `RegisterMap` gives the axis.
 
     Members

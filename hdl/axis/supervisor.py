@@ -31,8 +31,8 @@ class Supervisor(Block):
     are acknowledged. An acknowledgement that does not name exactly these causes has no effect. So a cause that came
     after the host's last look is not lost. `counts` are the occurrences of every cause since reset.
 
-    Latency: one clock from `drive` to `driven`, from a cause or a low enable to zero, and from a lower
-    `supervisor_force_limit` to a drive that obeys it. No word is committed here: all act at the next clock.
+    Latency: one clock. It holds from `drive` to `driven`, from a cause or a low enable to zero, and from a lower
+    `supervisor_force_limit` to the drive. No word is committed here: all act at the next clock.
 
     Rounding and overflow: the ceiling is rounded down to the force LSB. It keeps its fraction when the force limit
     lowers it. Counts saturate. The tick is a whole number of half periods of `alive`, 1 ms or just below.

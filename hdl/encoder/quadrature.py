@@ -69,26 +69,26 @@ class Quadrature(wiring.Component):
     whatever its phase. `glitch_clocks` may change at any time: edges keep their order. If it is lowered while edges of
     both A and B wait, both pass at once, which is `illegal` like any other such pair.
 
-    Speed: the count is exact up to 1 / max(1, (glitch_clocks + 1) / 2) edges a clock (`max_edge_rate` of the model,
-    which derives all of this, also for edges out of place). Beyond that rate, as long as every level of A and of B
-    lasts a clock or more (below 2 edges a clock), `fault` is up no later than the first wrong count, whatever the
-    motion. At a steady rate of ideal quadrature above 2 edges a clock it is up within `clocks_to_fault` of the model.
-    An exception is the exact range around a multiple of 4: there the samples equal a slow motion's. Two flags are for
-    that. `illegal`: A and B changed in one clock; nothing is counted or stamped. `overspeed`: the filter rejected a
-    pulse on A or B during which, its first and last clocks included, the other channel had an edge. A lone glitch
-    raises neither flag; a glitch that meets an edge of the other channel cannot be distinguished from speed, and raises
-    `overspeed`.
+    Speed: the count is exact up to 1 / max(1, (glitch_clocks + 1) / 2) edges a clock. The model derives all of this,
+    also for edges out of place (`max_edge_rate`). Beyond that rate `fault` is up no later than the first
+    wrong count, whatever the motion. This holds as long as every level of A and of B lasts a clock or more (below 2
+    edges a clock). At a steady rate of ideal quadrature above 2 edges a clock it is up within `clocks_to_fault` of the
+    model. An exception is the exact range around a multiple of 4: there the samples equal a slow motion's. Two flags
+    are for that. `illegal`: A and B changed in one clock; nothing is counted or stamped. `overspeed`: the filter
+    rejected a pulse on A or B during which, its first and last clocks included, the other channel had an edge. A lone
+    glitch raises neither flag; a glitch that meets an edge of the other channel cannot be distinguished from speed, and
+    raises `overspeed`.
 
     Start: counting starts from the pins as sampled by the first clock after a reset, whatever their levels.
 
     Index: one edge of Z's pulse, the same from both sides: there Z rises as the count goes up, and falls as it goes
-    down. Every edge of A and B looks at Z on its lower side: upwards just before its clock, downwards at it. Of two
-    successive edges in one direction, with no slip since the first one, the second finds an index if Z was 0 at the
+    down. Every edge of A and B looks at Z on its lower side: upwards just before its clock, downwards at it. Take two
+    successive edges in one direction, with no slip since the first one. The second one finds an index if Z was 0 at the
     lower and 1 at the upper of them. Its place is the count between the two. So a turn of the handle does not matter,
     nor does a hysteresis of A, B and Z below a count: the pulse's other edge is never taken. The count is beside the
     place by one (below it if the edge counted -1) when the index is found. A pulse between two edges is no index: Z has
-    to last a count. An edge of Z that lies on an edge of A or B may come a clock before or after it, or elsewhere
-    upwards than downwards, and is then a count off.
+    to last a count. An edge of Z that lies on an edge of A or B may come a clock before or after it. It may also lie
+    elsewhere upwards than downwards. It is then a count off.
 
     Slip: after `illegal`, `overspeed`, `wrapped`, another `invert` or `slip` the count belongs no more to the scale. In
     that clock `index_latched` and `referenced` fall. `preload` makes them fall too, for nobody knows by how much it
@@ -97,8 +97,8 @@ class Quadrature(wiring.Component):
     Rounding and overflow: nothing is rounded. `count`, `index_count` and the stamps wrap, `illegal_count` saturates. An
     edge or a shift of the origin that takes the count beyond an end of its range raises `wrapped` with the wrong count.
 
-    Coincidences: an edge decoded in the clock of `preload` is added to `preload_count`, and one in the clock of
-    `origin_shift` to the moved count, so no motion is lost. An index latched in the clock of either has the new count.
+    Coincidences: no motion is lost. An edge decoded in the clock of `preload` is added to `preload_count`. In the clock
+    of `origin_shift` it is added to the moved count. An index latched in the clock of either has the new count.
     `preload` has priority over `origin_shift`. `arm` has priority over an index, which is then not latched; a fault in
     the clock of `clear` stays.
 
@@ -159,8 +159,8 @@ class Quadrature(wiring.Component):
     ValueError
         If a width is out of its range.
 
-    Source: decoding by 4 and the filter of consecutive equal samples as in decoder chips (HCTL-2022 data sheet, Avago,
-    "Digital Noise Filter", fixed there at 3 samples); the flag for edges that such a filter hides is derived in the
+    Source: decoding by 4 and the filter of consecutive equal samples are as in decoder chips (HCTL-2022 data sheet,
+    Avago, "Digital Noise Filter"; 3 samples there); the flag for edges that such a filter hides is derived in the
     model.
     """
 
@@ -344,8 +344,8 @@ class Quadrature(wiring.Component):
         Args:
             m: the module.
             index, place: whether there is an index, and its place.
-            lost, beyond: whether the count loses its scale otherwise than beyond its range, and there. The latter comes
-                late in a clock.
+            lost, beyond: whether the count loses its scale within its range, and whether it does so beyond it. `beyond`
+                comes late in a clock.
         """
         latches = self.index_armed & index & ~self.arm
         with m.If(self.arm):

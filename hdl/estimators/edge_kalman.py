@@ -46,8 +46,8 @@ class Estimator(EstimatorBlock):
     Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`. One multiplier makes
     all seven products, each in two halves: the right operand is wider than a multiplier of the part.
 
-    Rounding and overflow: what a product corrects is rounded half up, the change of velocity, the mean and the bound
-    are rounded down, and so the line half up. Velocities and the error of the place saturate, with flags; the
+    Rounding and overflow: the values that a product corrects are rounded half up; the change of velocity, the mean and
+    the bound are rounded down, and so the line half up. Velocities and the error of the place saturate, with flags; the
     acceleration saturates, which is its limit. Count and stamp may wrap.
 
     Parameters

@@ -84,8 +84,8 @@ class Estimator(EstimatorBlock):
     def _corrected(self, m, e, u1, root, rooting):
         """Return u1 plus `step` (2 root + 1) within u's format, and whether it was beyond, in the root's last clock.
 
-        No product waits for the root. Its digits come high ones first; at every clock the sum so far goes up by a
-        digit's place, takes in two bits of u1 from below, and adds the digit's multiple of the step.
+        No product waits for the root. Its digits come high ones first; at every clock the sum moves up by a digit's
+        place and takes in two bits of u1 from below; then it adds the digit's multiple of the step.
         """
         design, velocity = self.design, self.design.velocity
         digits = sqrt_digits(design.radicand.width)

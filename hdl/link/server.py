@@ -24,9 +24,9 @@ class Server(wiring.Component):
     to check it, and once to do it, so nothing is done of a frame that ends in an exception. A frame that reads takes a
     snapshot before the first register.
 
-    Latency: to the first byte of an answer less than 30 clocks, 21 for every register to write, 4 for every register to
-    read, and the register file's times for a snapshot and a commit. Throughput: one frame after the other; a byte of an
-    answer waits for the line.
+    Latency: to the first byte of an answer less than 30 clocks; also 21 for every register to write, 4 for every
+    register to read, and the register file's times for a snapshot and a commit. Throughput: one frame after the other;
+    a byte of an answer waits for the line.
 
     Rounding and overflow: the counters wrap.
 
@@ -47,8 +47,8 @@ class Server(wiring.Component):
     TypeError
         If `design` is not a Design.
 
-    Source: "Modbus Application Protocol Specification V1.1b3", sections 6.3, 6.4, 6.6, 6.8, 6.12, 6.17, 6.21 (the
-    functions) and 7 (the exceptions).
+    Source: "Modbus Application Protocol Specification V1.1b3", sections 6.3, 6.4, 6.6, 6.8, 6.12, 6.17, 6.21
+    (functions) and 7 (exceptions).
     """
 
     def __init__(self, design: Design):

@@ -84,8 +84,8 @@ def passes(divisor_width: int, factor_width: int) -> int:
 def latency(divisor_width: int, quotient_width: int, factor_width: int = 1) -> int:
     """Return the clocks from `start` to `done` of the hardware.
 
-    One clock loads the operands, two make each shift of them, five make the reciprocal and multiply both operands by
-    it, and two make each digit.
+    One clock loads the operands, and two make each shift of them. Five make the reciprocal and multiply both operands
+    by it. Two make each digit.
     """
     return 6 + 2 * passes(divisor_width, factor_width) + 2 * digits(quotient_width + 1)[0]
 

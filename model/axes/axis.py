@@ -168,9 +168,9 @@ class Axes:
 
         Args:
             counts: integers, shape (axes, samples). A count may exceed the count's width: it wraps, as in the hardware,
-                and from there on the flag count_wrapped is up and the drive is zero. A count that goes by more in a
-                sample than the sample has clocks raises the encoder's flag of an illegal step in the same way. It may
-                not jump by half of its range.
+                and from there on the flag count_wrapped is up and the drive is zero. If a count changes by more than
+                the clocks of a sample, the encoder's flag of an illegal step is up in the same way. It may not jump by
+                half of its range.
 
         Raises:
             TypeError: if the counts are not integers.

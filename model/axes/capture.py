@@ -5,8 +5,8 @@ the memory sees only this axis, even if the word changes.
 
 The values of a sample come at two clocks. Its record has all of them except the state and the limited drive. These two
 come with the axis's turn. Both are kept until the axis's next sample. The memory takes the sample `SAMPLED` clocks
-after its record. So every value of a record in the memory is of one sample, and triggers are found as for an axis
-alone, but that a trip comes with a turn.
+after its record. So every value of a record in the memory is of one sample. Triggers are found as for a single axis,
+except that a trip comes with a turn.
 
 The pulses come to the memory `PULSED` clocks late: a sample of the axis before, which may be on its way, comes with the
 start at the latest, and does not count.

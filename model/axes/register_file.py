@@ -7,8 +7,8 @@ one clock. A live word goes to its axis as soon as its lower half is written.
 
 The status of the axes is not in cells. A snapshot takes the status of one axis: of its next sample, and of its
 supervisor at that sample. The stamps of edges are remembered here: the stamps of the last edges in the sample's count,
-each 0 until there is one. Every value of a frame is so of one sample, which was taken when the pulses of every frame
-before it, and of its own, had acted.
+each 0 until there is one. So every value of a frame is of one sample. The sample comes after the pulses of all frames
+before, and of the frame itself, have acted.
 
 No frame can write to two banks, and none can read the status of two: between them lies what cannot be written, and more
 than a frame can read.

@@ -23,8 +23,8 @@ In debt, where the wall renders a force, the controller adds a damper to it:
 It takes a force to zero at most, and never turns it: it cannot pull where the wall pushes. The force is within the
 axis's range before the damper is taken off; in float64, where a wall has no range, behind it. The hardware halves the
 damper where float64 divides. The part is passivity_damping 2**-n with the least n that satisfies this: the bits of the
-damper's force, of the velocity and of the samples until the next actuation are together at most the bits of the debt.
-Unless n is 0, less than twice the debt is dissipated until then. At least a quarter of the debt is dissipated where the
+damper's force, the velocity and the samples until the next actuation are together at most the bits of the debt. Unless
+n is 0, less than twice the debt is dissipated until then. At least a quarter of the debt is dissipated where the
 samples of an actuation are a power of two, else an eighth. One exception is the rounding of the part to zero: a debt of
 less than the work of one force LSB stays.
 

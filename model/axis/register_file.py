@@ -4,8 +4,8 @@ A book of 16-bit cells has four areas of 256, which one port of a memory reads a
 
 - LIVE is what the host reads, by the address of the register.
 - RESET is what LIVE is set to by a reset: constants, and words as after a reset.
-- LEAST and MOST are the bounds of what may be written. Of a register of a status or of an active word, LEAST says how
-  it comes from the chain of a snapshot, or goes there for its port (`_moves`).
+- LEAST and MOST are the bounds of what may be written. For a status or an active word, LEAST says how it
+  comes from a snapshot's chain, or goes there for its port (`_moves`).
 
 A written word stays in LIVE until a commit. The commit copies every word to its active cell and to the port that the
 axis reads. Then the pulses of the frame go out, all at one clock, and the axis takes the words at its next sample. A

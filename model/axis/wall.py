@@ -8,8 +8,8 @@ With `forbid_pull`, push is never negative: a damper that pulls back a leaving h
 
 A `Design` with `coupling` has two words more. `wall_velocity` is the surface's velocity, else 0. With `two_sided` the
 wall pushes at every depth, inside and outside. So a simulated tool can be coupled to the handle by a spring and a
-damper at the rate of the axis, while the tool itself is simulated at a lower rate. (Colgate, Stanley and Brown, Issues
-in the haptic display of tool use, IROS 1995.)
+damper at the rate of the axis. The tool itself may be simulated at a lower rate. (Colgate, Stanley and Brown, Issues in
+the haptic display of tool use, IROS 1995.)
 
 Formats, derived, with the force LSB r, the count q and the sample period tau:
 
@@ -75,8 +75,8 @@ class FloatParams(NamedTuple):
 
 
 def damper_formats(axis: AxisRequirements, velocity: SQ) -> tuple[UQ, SQ, SQ]:
-    """Return the formats of a damping word, in force LSB a count/sample, of the velocity as the damper takes it, and of
-    a velocity with every bit that a damper can use."""
+    """Return three formats: of a damping word, in force LSB a count/sample; of the velocity as the damper takes it; and
+    of a velocity with every bit that a damper can use."""
     tau = 1 / axis.sample_hz
     damping = gain_format(axis.damping_max_n_s_per_m * axis.count_m / tau / axis.force_resolution_n)
     whole = SQ(velocity.i, max(1 + damping.i, 1 - velocity.i))

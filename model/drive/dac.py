@@ -7,8 +7,8 @@ With b bits the output has 2**b codes from minus to plus the full scale, the mid
 where `steps` is at most 2**(b-1) - |offset|, so that a code is never beyond the lowest.
 
 The frame is, from its first bit on, a header, the code in b bits (offset binary or two's complement), and trailing
-zeros. Half a period of the serial clock has H clocks; with F bits a frame is under way for 2 F + 1 halves, from the
-fall of the chip select to its rise, and another half later the next may begin.
+zeros. Half a period of the serial clock has H clocks; with F bits a frame takes 2 F + 1 halves, from the fall of the
+chip select to its rise; another half later the next frame may begin.
 
 Behind every arming the frames of `setup` go out first, one at an actuation: what a DAC wants to be told before it makes
 volts. The clear pin is low unless the axis is ARMED: its level must hold the DAC at the middle code, or its output at

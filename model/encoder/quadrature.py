@@ -317,8 +317,8 @@ def resting(params, state, count, pins, clocks):
 
 @compiled
 def _lone(state, pins, inputs, clocks):
-    """Return whether a settled state meets the edge of one channel, A or B, that is decoded and settled in `clocks`,
-    and that finds no index."""
+    """Return whether a settled state meets an edge of one channel, A or B, that finds no index and is decoded and
+    settled in `clocks`."""
     changed, still = state.level ^ pins, state.inverted == inputs.invert and settled(state, state.level)
     return 0 < changed < 3 and clocks > LATENCY + inputs.glitch_clocks and still and state.below == state.level >> 2
 

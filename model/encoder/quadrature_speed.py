@@ -1,7 +1,7 @@
 """The highest speeds of an encoder at which the decoder of `quadrature` counts every edge or raises a flag.
 
-At a rate of r edges (of A and B together) a clock, every level of A and of B lasts 2/r clocks, and an edge follows the
-previous edge after 1/r clocks. A level is accepted if it is seen at glitch_clocks + 1 clocks; this is certain if it
+Let the rate be r edges a clock, of A and B together. Every level of A and of B then lasts 2/r clocks. An edge follows
+the previous edge after 1/r clocks. A level is accepted if it is seen at glitch_clocks + 1 clocks; this is certain if it
 lasts that many clocks. Two edges are seen separately and in order if they are at least one clock apart. Every accepted
 edge has the same delay, so the count is exact for r <= 1 / max(1, (glitch_clocks + 1) / 2): `max_edge_rate`.
 
@@ -32,7 +32,8 @@ def max_edge_rate(clock_hz: float, glitch_clocks: int, edge_error: float = 0.0) 
     """Return the highest steady rate of edges, in Hz, at which the count is exact and no flag rises.
 
     `edge_error` is how far, in counts, the encoder's edges may be from their ideal places. It shortens the shortest
-    level from 2 to 2 - 2 `edge_error` counts, and the least distance of two edges from 1 to 1 - 2 `edge_error` counts.
+    level from 2 to 2 - 2 `edge_error` counts. It shortens the least distance of two edges from 1 to 1 - 2 `edge_error`
+    counts.
 
     Raises:
         ValueError: if `edge_error` is not from 0 to less than 0.5.

@@ -1,9 +1,9 @@
 """Learns a map of an encoder's scale from the stamped edges of training passes: the host's part of `scale_map`.
 
-Edge k of a pass, number n_k, was passed at its stamp t_k, so the axis was then at n_k + e(n_k), and half the hysteresis
-h off in the direction of motion. The motion x of a pass is modelled as a spline of degree DEGREE, with a knot every
-`knot_s`, over the edges on both sides of any moment. Every bin of the map has one error. All of them at once are those
-with the least sum of squares, over all passes:
+Edge k of a pass, number n_k, was passed at its stamp t_k. The axis was then at n_k + e(n_k), and half the hysteresis h
+off in the direction of motion. The motion x of a pass is modelled as a spline of degree DEGREE with a knot every
+`knot_s`. It covers the edges on both sides of any moment. Every bin of the map has one error. All of them at once are
+those with the least sum of squares, over all passes:
 
     sum_k (x(t_k) - n_k - e(bin of n_k) - h d_k)**2 + RIDGE sum_bins e**2             d_k = 1/2 upwards, -1/2 downwards
 
@@ -11,7 +11,7 @@ The errors are eliminated bin by bin, and the coefficients of the splines are th
 stamps and numbers is used, and no order of passes matters.
 
 What cannot be told. If a spline can follow an error as a function of the time of a pass, the error cannot be told from
-motion. Such errors are a constant, a term proportional to n, and a wave so long that it passes below about 1 / (2
+motion. Such errors are a constant, a term proportional to n, and a long wave: one that passes below about 1 / (2
 knot_s) Hz in all passes. RIDGE, which is far less than one edge, gives that part to the motion: a map keeps the mean
 and the scale of the encoder. In turn, motion of the hand above that frequency is taken for an error of the scale. It
 differs in every pass, so it falls with the number of passes.

@@ -66,8 +66,8 @@ class Watch(NamedTuple):
     """The state: the last sample, and the edges and counts before the ones that are judged.
 
     `stamp`, `edge` and `count` are of the last sample, `quiet` is the age of its last edge. `silence` and `base` are
-    the quiet and the count before the edges of the last `window` samples. `events` is the number of remembered jolts,
-    `left` the number of samples for which they stay remembered. Ages are cut off at what every jolt has.
+    the quiet and the count before the edges of the last `window` samples. `events` is the number of remembered jolts;
+    `left` is the number of samples until they are forgotten. Ages are cut off at what every jolt has.
     """
 
     running: int

@@ -6,9 +6,9 @@ Per sample, with d the difference of the last two counts, in counts and sample p
     w <- w + gamma (x - y) - beta w
     y <- y + gamma w                     the velocity, output `u`; with the new w
 
-Let g = tan(pi f_c / f_s) and D = 1 + sqrt(2) g + g^2. Then gamma = 2 g / sqrt(D) and beta = 2 sqrt(2) g / D make this
-the bilinear transform, prewarped, of 1 / (s^2 + sqrt(2) s + 1). Eliminating w gives y[k] - (2 - beta - gamma^2) y[k-1]
-+ (1 - beta) y[k-2] = gamma^2 x[k]. Before the first sample the filter is at rest at velocity 0.
+Let g = tan(pi f_c / f_s) and D = 1 + sqrt(2) g + g^2. Let gamma = 2 g / sqrt(D) and beta = 2 sqrt(2) g / D. Then this
+is the bilinear transform, prewarped, of 1 / (s^2 + sqrt(2) s + 1). Eliminating w gives y[k] - (2 - beta - gamma^2)
+y[k-1] + (1 - beta) y[k-2] = gamma^2 x[k]. Before the first sample the filter is at rest at velocity 0.
 
 Source: Chawda, Celik, O'Malley, World Haptics 2011, "FDM" with a Butterworth filter; Butterworth 1930.
 

@@ -1,6 +1,6 @@
 """Times of whole encoder cycles from the clock stamps of their edges, exact to the stamps.
 
-The four edges of an encoder's cycle (A rise, B rise, A fall, B fall) may be out of place, each kind by its own error.
+An encoder's cycle has four edges: A rise, B rise, A fall, B fall. They may be out of place, each kind by its own error.
 But an edge is exactly 4 counts from the edge of its kind in the next cycle. So the time of a cycle is the time between
 two edges of one kind. `observe` subtracts, from the stamp of the last edge, the stamp of its kind at the previous
 sample. The difference spans a whole number of cycles only if all edges between went in one direction. Samples show this

@@ -5,7 +5,7 @@ bounds on jerk and acceleration. Times are in units of 2**`unit` clocks, 1 clock
 TIME_BITS bits; D is then the units in a sample.
 
 The rule. A memory M averages over the M / T edges in it, so the place of the axis is known to about s sqrt(T / M).
-Within M the motion may change unforeseen by J M**3 through its jerk, and at an impact by C M**2 through a jump of its
+Within M the motion may change unforeseen: by J M**3 through its jerk, and at an impact by C M**2 through a jump of its
 acceleration. At each of the two memories, this change is a constant share of the place's error:
 
     J M_quiet**3 = QUIET s q sqrt(T / M_quiet)            C M_agile**2 = AGILE s q sqrt(T / M_agile)
@@ -13,7 +13,7 @@ acceleration. At each of the two memories, this change is a constant share of th
 and M_agile is at most M_quiet. s combines the bound on an edge's error and, independent of it, the stamp's error at the
 largest speed. LEVELS memories are used, with equal ratios from one to the next. Their gains belong to the steady state
 at constant T (`riccati`), for a bandwidth of T / M a sample. QUIET, AGILE, ALARM and GROWTH were chosen by measurement,
-with the impact's C and the jerk of the paper's swing, and are the same for every axis.
+with the impact's C and the jerk of the paper's swing. They are the same for every axis.
 
 A row of the table is for a level and the top two bits of T. It is computed for the M and T in the middle of the row, at
 most a fifth off. K_v T and K_a T**2 are then too large by up to 1.22 and 1.5 at the row's longest T. The filter

@@ -17,8 +17,8 @@ Source: Belanger, Dobrovolny, Helmy, Zhang, International Journal of Robotics Re
 Noise model. The quantisation error and the acceleration are two stationary signals with exponential correlation: the
 error has RMS q / sqrt(12), and the acceleration, uniform within the axis's C, has RMS C / sqrt(3). The correlation
 times (`noise_time_s`, `acceleration_time_s`) are by default 2 sqrt(q/C), the minimax window of an error of one count.
-In a shorter time a change of acceleration does not show in the counts, and an axis that starts to move does not reach
-the next count. Either signal is modelled as a white one with the same power below those rates:
+In a shorter time a change of acceleration does not show in the counts. Nor does an axis that starts to move reach the
+next count. Either signal is modelled as a white one with the same power below those rates:
 
     R = rms^2 coth(tau / (2 time))        counts^2: gives the variance of the mean of many samples
     Q = 2 rms^2 (1 - exp(-tau / time))    mean square change of the acceleration in a sample
@@ -35,11 +35,11 @@ Formats, derived. C' = C tau^2 / q; 2**reach is at least 1/h and at least 1.
   within a count, and one count for an edge out of place. A larger difference saturates (flag `velocity_saturated`): the
   excess is a displacement of the scale, without later effect.
 - The states are then bounded by the norms (sums of absolute impulse responses) from the difference of counts to v, a
-  and lead, `norms`, times `step_max`. Their formats hold that bound plus one of their unit; with the gains of a noise
-  model nothing else saturates. With other gains `lead` may saturate (flag `innovation_saturated`; it drags x along),
-  or v or a (flag `state_saturated`).
+  and lead: `norms`, times `step_max`. Their formats hold that bound plus one of their unit; with the gains of a noise
+  model nothing else saturates. With other gains `lead` may saturate (flag `innovation_saturated`; it drags x along), or
+  v or a (flag `state_saturated`).
 - f, fraction bits of the velocity: an LSB is at most sqrt(C') 2**-RESOLUTION_BITS.
-- lead, v and a have GUARD_BITS more than f, v another `reach` and a another twice `reach`, since a state's rounding
+- lead, v and a have GUARD_BITS more than f; v has another `reach`, and a another twice `reach`: a state's rounding
   error appears in the velocity 1, 1/h and 1/h^2 times. An error of r appears h times, so the operand r has reach - 1
   bits less than lead. All products, the sums' narrower parts and r are floored. In the worst case all floors add up to
   ERROR_NORM 2**-GUARD_BITS of an LSB of the velocity, which is less than a half: *at constant n counts a sample the

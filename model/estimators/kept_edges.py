@@ -19,8 +19,8 @@ Formats, derived.
 - `velocity` and the quotient have the formats of `period`.
 - A sample is at most half as long as with `period`: a window of one sample then fits stamps, and a dividend, below
   c 2**(stamp_width + 7), int64.
-- `edges_max`: the decoder counts at most one edge a clock, so that between two kept edges and the last one are at most
-  c (2 half + 1); more are limited. The dividend is at most c edges_max 2**(f + 1), and may have `DIVIDEND_BITS`.
+- `edges_max`: the decoder counts at most one edge a clock: between two kept edges and the last one are at most c (2
+  half + 1); more are limited. The dividend is at most c edges_max 2**(f + 1), and may have `DIVIDEND_BITS`.
 - An edge is forgotten after AGE_LIMIT of the stamp's range, as in `cycle_times`. The older edge was no older than that
   when it was taken, at most a window ago. So with a window of at most WINDOW_LIMIT of the range no time aliases.
 

@@ -33,7 +33,7 @@ Range of the gains. Three kinds of words make an estimate that is wrong without 
 
 - alpha = 0: u1 never moves.
 - a lambda near 0: nothing damps the swing of u1 about a constant speed. The swing falls by a factor of lambda and
-  sqrt(alpha) alone, and its last size is some 2 alpha^1.5 / lambda counts a sample: hence UNDAMPED.
+  sqrt(alpha) alone. Its last size is some 2 alpha^1.5 / lambda counts a sample: hence UNDAMPED.
 - a lambda above 2, for the explicit sign alone. An error below lambda^2 / 4 changes its sign at every sample. So u1
   stands still while it is less than about lambda^2 / 4 counts a sample away from the speed. `LAMBDA_MAX` keeps that to
   a count a sample.

@@ -9,9 +9,8 @@ Level 0 is the fixed-gain estimator for the axis's bound C. Every further level 
 sqrt(L q), by sqrt(2), and makes the estimator slower. The levels below 0 are for an impact beyond C. All times below
 are in samples, all lengths in counts:
 
-1. *Time on one side*: t counts the samples since b last changed its sign (`elapsed`), and `reached` is the last level
-   whose L explains an excursion of LOST counts in t: L >= EXCESS LOST / t^2. t starts again at 0 with every change of
-   sign.
+1. *Time on one side*: t counts the samples since b last changed its sign (`elapsed`). `reached` is the last level whose
+   L explains an excursion of LOST counts in t: L >= EXCESS LOST / t^2. t starts again at 0 with every change of sign.
 2. *Lost*: |b| >= LOST, more than quantisation of one count can cause. Then j falls at once to `reached`, if j is above.
    Each time |b| has doubled again, j falls to `reached` or by two, whichever is lower: two levels multiply L by 4 and
    lambda by 2. The first doubling leads no further than level 0, because any acceleration up to C may need level 0.
@@ -29,19 +28,19 @@ most A tau a sample, since both corrections pull back. Its sum, the position err
 error of u is at most sqrt(2 (LOST + 1) A q) = 2.45 sqrt(A q) until the loss. An acceleration A out of rest is seen
 within sqrt(2 (LOST + 1) q / A) = 2.45 sqrt(q / A)*. Both take a sample longer, and neither depends on L. Fixed gains
 for exactly that A give errors up to 1.7 sqrt(A q). If the sign changed when the acceleration began, the required L is
-EXCESS LOST / (2 (LOST + 1)) A = 2.7 A or more, which is enough. At the loss u steps by lambda_j sqrt(beyond). Its error
+at least EXCESS LOST / (2 (LOST + 1)) A = 2.7 A. This is enough. At the loss u steps by lambda_j sqrt(beyond). Its error
 may then become lambda_j sqrt(LOST + 1) on the other side: at most the largest error that the fixed gains of level 0 can
 make.
 
-*Beyond C.* For A up to 4^m 1.1 L_max, with 1 <= m < RAISED / 2, level -2m is reached once |b| is B = LOST 2^(m+1). Up
-to there the error of u is at most sqrt(2 (B + 1) A q), as above. There alpha_j >= A. So the error of u falls with
+*Beyond C.* Let A be up to 4^m 1.1 L_max, with 1 <= m < RAISED / 2. Level -2m is reached once |b| is B = LOST 2^(m+1).
+Up to there the error of u is at most sqrt(2 (B + 1) A q), as above. There alpha_j >= A. So the error of u falls with
 sqrt(|b|) at the rate lambda_j, and u steps by half of lambda_j sqrt(B). In these terms, with lambda_j >= 0.95 sqrt(A)
-and B >= 8, the error is at most 1.02 sqrt(B A q) after that step. It is 0.63 sqrt(B A q) when |b| has doubled. The next
-step, of 1.35 sqrt(B A q), turns the error round. So |b| <= 2 B, and *the error of u is at most sqrt(2 (B + 1) A q), or,
-on the other side, the whole lambda_j sqrt(2 B + 1) of level j = -2m - 2*, each a sample longer. For an impact of 51
-m/s^2 with C = 12, A = 4.4 C, these largest errors are 30 and 57 mm/s. Measured was 27 (25 impacts from 0.01 to 0.6 m/s,
-1 MHz). With the gains of level 0 the error grows until the motion ends, to 237 mm/s then. With m = RAISED / 2, up to
-17.6 C, there is no further level, and |b| may reach 4.2 B. Measured was 57 mm/s at 190 m/s^2.
+and B >= 8, the error is then at most 1.02 sqrt(B A q). It is 0.63 sqrt(B A q) when |b| has doubled. The next step, of
+1.35 sqrt(B A q), turns the error round. So |b| <= 2 B, and *the error of u is at most sqrt(2 (B + 1) A q); on the other
+side it is at most the whole lambda_j sqrt(2 B + 1) of level j = -2m - 2*. Both take a sample longer. For an impact of
+51 m/s^2 with C = 12, A = 4.4 C, these largest errors are 30 and 57 mm/s. Measured was 27 (25 impacts from 0.01 to 0.6
+m/s, 1 MHz). With the gains of level 0 the error grows until the motion ends, to 237 mm/s then. With m = RAISED / 2, up
+to 17.6 C, there is no further level, and |b| may reach 4.2 B. Measured was 57 mm/s at 190 m/s^2.
 
 *Limitations.* (a) The transient above is up to sqrt(2) times larger than with fixed gains. (b) Out of rest the sign
 often changes with the first count, not with the acceleration. Then t is too short, L too large, and u overshoots: 6.6

@@ -28,14 +28,14 @@ is learnt from E. With the limit, the estimate would be left behind: v adds a T 
 of its format, where lambda is too low to hold it. In an interval of more than `mantissa` bits neither limit applies: no
 error that an axis makes reaches them.
 
-The places of edges. On a real scale the four kinds of edges (by pin and polarity, in the upward sense) are out of place
-by up to half a count. `place` holds the displacements, times D. After a full cycle in one direction, an edge moves two
-places apart by E 2**-LEARN_SHIFT: the places of its own kind and of the last edge's kind. For this, |E| is limited to
-D/4 to D/2. One of the four unknowns is the origin, which the symmetric step does not move. Steady speed excites two
-patterns of a cycle. For these, the loop from places over v and a to E is 2 and (1 + j) / (1 - g/2). Its real part is
-positive, so learning is stable with any step less than 1/4. It takes some ten cycles. (With g = 1, and v corrected by a
-as well, it is not stable: see the table.) The residual of an interval cut by k bits is weighted by 2**-k: slow motion
-learns slowly.
+The places of edges. A real scale has four kinds of edges, by pin and polarity in the upward sense. They are out of
+place by up to half a count. `place` holds the displacements, times D. After a full cycle in one direction, an edge
+moves two places apart by E 2**-LEARN_SHIFT: the places of its own kind and of the last edge's kind. For this, |E| is
+limited to D/4 to D/2. One of the four unknowns is the origin, which the symmetric step does not move. Steady speed
+excites two patterns of a cycle. For these, the loop from places over v and a to E is 2 and (1 + j) / (1 - g/2). Its
+real part is positive, so learning is stable with any step less than 1/4. It takes some ten cycles. (With g = 1, and v
+corrected by a as well, it is not stable: see the table.) The residual of an interval cut by k bits is weighted by
+2**-k: slow motion learns slowly.
 
 The bound without a further edge. Let v be the velocity at the anchor, and no edge come for s clocks. A constant
 deceleration that stops within the cell leaves at most 2 D/s - |v|. A motion that turns within the cell returns no
@@ -43,8 +43,8 @@ faster than v. The line is held within -v and bound - v, where bound = (5/2) D 2
 tighter than for a cell a quarter too wide. While an edge is too close to the anchor, the bound is twice that, and there
 is none at first. An axis is at rest, v = a = 0, once the line is at twice the bound: no parabola through the cell comes
 there. It is at rest too after half the range of the stamp, since slower edges cannot be distinguished from rest. A stop
-from constant speed reads exactly 0 after 2.5 to 5 times the time of a count (plus two of the shortest intervals, if a
-count takes less); until then it reads the old speed.
+from constant speed reads exactly 0 after 2.5 to 5 times the time of a count; if a count takes less than the shortest
+interval, two of these come on top. Until then it reads the old speed.
 
 Bursts. Some encoders emit several edges at once, after a silence that does not mean a slower axis. `refuted` finds them
 by an edge at which the axis is faster than the last bound allows. For `bursts.doubt_samples` from then on the line is
@@ -56,9 +56,8 @@ correction. In a silence shorter than T the bound is D / s + A s/2 where that is
 On the surface it is 2 p D / T; any motion that the gains allow reaches the surface within a few edges. (The bound is
 far from tight for an a near the true one. But it holds for every a within the format, so it holds beyond C, too.)
 
-Measured RMS error in mm/s. Paper: 50 exp(-t) sin(2 pi t) mm, t in [1, 5] s, 1 um, 1 MHz, gains for C = 12 m/s^2,
-50 MHz stamps; hit: 0.35 kg at 0.3 m/s on 10 kN/m and 20 N s/m (up to 68 m/s^2); late: the same with B late by
-0.25 count.
+Measured RMS error in mm/s. Paper: 50 exp(-t) sin(2 pi t) mm, t in [1, 5] s, 1 um, 1 MHz; gains for C = 12 m/s^2, 50 MHz
+stamps; hit: 0.35 kg at 0.3 m/s on 10 kN/m and 20 N s/m (up to 68 m/s^2); late: the same with B late by 0.25 count.
 
     design, float                                                 paper    late     hit     late
     levant on the count, u / u1                                   1.75 / 0.58       177 / 258

@@ -1,7 +1,7 @@
 """Levant's differentiator by implicit Euler, for both the sign and the square root, in fixed point.
 
-The algorithm is `levant_semi_implicit`, but the root, too, is of the error after the step. Per sample, with f the
-count, x its tracked value, u1 the integral state, in counts and sample periods, and a plus for after the sample:
+The algorithm is `levant_semi_implicit`, but the root, too, is of the error after the step. Per sample, in counts and
+sample periods; f is the count, x its tracked value, u1 the integral state, and a plus means after the sample:
 
     e+  =  x + u1 - f  -  lambda sqrt(|e+|) sign(e+)  -  alpha S,      S in SGN(e+)
     u1+ =  u1 - alpha S
@@ -30,11 +30,11 @@ Formats are as in `levant_semi_implicit`, except:
   lambda times the root. `radicand` has room for lambda^2/4 at the largest word. In the radicand, lambda^2/4 is rounded
   down to the LSB, a position of 2**-(2 root.f); in g, lambda^2/2 is rounded to f bits.
 - With the root's half LSB as in `levant`, the error of g is at most delta = lambda 2**-(root.f+1) + 2 * 2**-(f+1). The
-  same u follows exactly from a beyond displaced by at most eta = 2 sqrt(beyond + lambda^2/4) delta / lambda + (delta /
-  lambda)^2 + 2**-(2 root.f). At beyond = 1 count the slope is sqrt(4 + lambda^2): each part of delta is held to
-  POSITION_BUDGET / 2 there. At low rates this takes a root of more bits than in the explicit estimator. (If lambda is
-  in the thousands, the radicand would exceed int64: the root then has the remaining bits, and delta grows.) g is held
-  within 0 to beyond.
+  same u follows exactly from a displaced beyond. The displacement is at most eta = 2 sqrt(beyond + lambda^2/4) delta /
+  lambda + (delta / lambda)^2 + 2**-(2 root.f). At beyond = 1 count the slope is sqrt(4 + lambda^2): each part of delta
+  is held to POSITION_BUDGET / 2 there. At low rates this takes a root of more bits than in the explicit estimator. (If
+  lambda is in the thousands, the radicand would exceed int64: the root then has the remaining bits, and delta grows.) g
+  is held within 0 to beyond.
 """
 
 import math

@@ -5,7 +5,7 @@ With c clocks a sample, and for the last edge its number N on the scale and its 
     v = c (N - N') / (S - S')       N', S': the last edge that was known half a window to a whole one ago
     bound |v| <= 3 c / 2 A          the last edge was A ago, and the next is at most 1.5 counts from it
 
-The classical method counts the edges of a sample (M), and times them (T) from the last edge before the sample to the
+The classical method counts the edges of a sample (M). It times them (T) from the last edge before the sample to the
 last edge in it. So counts and time belong together and neither has a fraction. Here samples may be much shorter than
 the window. Two edges are kept: every half window, of `half` samples, the newer one becomes the older one and the last
 edge becomes the newer one. v is made anew in every sample, over half a window to a whole one. If no edge came it is

@@ -15,7 +15,7 @@ Sources. The loop of encoder-driven servo drives, whose published firmware has t
 ki = kp^2 / 4, with the bandwidth in rad/s, 1000 by default; kp must be less than the sampling rate. moteus: kp = 2 w,
 ki = w^2 with w = 2 pi pll_filter_hz / 2.48, 400 Hz by default. pll_filter_hz is the frequency at which the *position*
 has fallen by 3 dB, 2.48 w for a double pole. In the first releases of moteus, w = 2 pi pll_filter_hz, as here. Both
-defaults are 160 Hz here. ODrive also drops the fraction of a count of its own position before it compares, and holds
+defaults are 160 Hz here. ODrive also drops the fraction of a count of its own position before it compares. It holds
 velocities below half a step of the loop at 0. Neither is done here: rest is exactly 0 without them.
 
 Beside `kalman`. The steady-state Kalman filter of two integrators has this form too, but gains of sqrt(2) h and h^2, a
@@ -39,11 +39,11 @@ Formats, derived. C' = C tau^2 / q is the bound on the acceleration in counts a 
 - The difference of counts is held within `step_max`: the counts that twice the largest speed moves in a sample, begun
   within a count, and one count for an edge out of place. A larger one saturates (flag `velocity_saturated`): the excess
   is a displacement of the scale, without later effect.
-- The host may lower the bandwidth to the designed one / 2**RANGE_BITS, and raise it to at least 2**HEADROOM_BITS times
-  that, or to the end of the words: `least` and `most` are these h. The ranges of v and lead are the norms at `least`
-  times `step_max`, plus one. Within that range of bandwidths nothing else saturates, and no other word is accepted.
-  After a change of the bandwidth in motion lead may (flag `innovation_saturated`; it drags x along), and v (flag
-  `state_saturated`).
+- The host may lower the bandwidth to the designed one / 2**RANGE_BITS. It may raise it to at least 2**HEADROOM_BITS
+  times the designed one, or to the end of the words: `least` and `most` are these h. The ranges of v and lead are the
+  norms at `least` times `step_max`, plus one. Within that range of bandwidths nothing else saturates, and no other word
+  is accepted. After a change of the bandwidth in motion lead may (flag `innovation_saturated`; it drags x along), and v
+  (flag `state_saturated`).
 - f, fraction bits of the velocity: an LSB is at most sqrt(C') 2**-RESOLUTION_BITS. lead has GUARD_BITS more, and v
   another `reach`, 1 / `least` as a power of two, at least 2.
 - The multiplier takes lead without its last `less` bits, with most 2**less < 1. Then it takes h e, which has the

@@ -7,8 +7,8 @@ counted.
 
 No single bit that is flipped on the way lets a frame through. The CRC finds every flipped bit, as long as the frame is
 taken with its true length. A flip changes that length only by way of the function or of a byte count. No function with
-a length differs by one bit from a function with another length, so that a flipped function either keeps its length or
-ends by a gap. And a byte count that does not agree with its number of registers is refused by the server.
+a length differs by one bit from a function with another length. So a flipped function either keeps its length or ends
+by a gap. And a byte count that does not agree with its number of registers is refused by the server.
 """
 
 from enum import IntEnum

@@ -1,9 +1,9 @@
 """How accurate a velocity estimator is: known motions at any rate, on any backend, against the exact derivative.
 
 Gains are the estimator's defaults for the signal's own bound C on the acceleration, unless others are given; a bound on
-the jerk is the swing's for every signal. The clock is the slowest multiple of the rate that is at least 50 MHz and
-leaves 50 clocks a sample, enough for every estimator's path. Above 1 MHz the clock is faster than a real part's, so the
-stamps are finer too. The row reports the clock.
+the jerk is the swing's for every signal. The clock is the slowest multiple of the rate with at least 50 MHz and 50
+clocks a sample, enough for every estimator's path. Above 1 MHz the clock is faster than a real part's, so the stamps
+are finer too. The row reports the clock.
 """
 
 import math

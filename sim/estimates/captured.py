@@ -73,7 +73,7 @@ def position_counts(edges: EdgeRecord, rate_hz: float, samples: int) -> np.ndarr
 
 def _slopes(times_s: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Return the slope of the curve at every edge, counts/s. It is the slope of the parabola through the edge and its
-    two neighbours, limited so that the curve stays monotone between two places, and within a count where the motion
+    two neighbours. It is limited: the curve stays monotone between two places, and within a count where the motion
     turns."""
     apart_s = np.diff(times_s)
     between = np.diff(places) / apart_s

@@ -6,9 +6,9 @@ its initial rate of change is that to the time W behind it,
 
     rate-hardness = push(W) / (W v),
 
-where push(W) is the mean push from 0.9 W to 1.1 W, so that it is not one step of a held force, or one sample of a noisy
-estimate. A wall of K and B that is neither late nor held has K + B / W: its force is B v at once, a step of infinite
-rate, and then rises by K v. So the first force that acts is said apart, and how long after the contact.
+where push(W) is the mean push from 0.9 W to 1.1 W: not one step of a held force, nor one sample of a noisy estimate. A
+wall of K and B that is neither late nor held has K + B / W: its force is B v at once, a step of infinite rate, and then
+rises by K v. So the first force that acts is said apart, and how long after the contact.
 
 The contact is the time at which the handle passes position 0. The wall's first force comes with its first count.
 """

@@ -1,8 +1,8 @@
 """A handle that is moved along a known path, whatever pushes it, and the force with which the wall of a scene answers.
 
-As in the closed loop are: the encoder's edges, the decoder's time, the clocks up to the changed drive, the hold until
-the next one, an amplifier's delay and the steps of a converter. What is behind them is left out: an amplifier's lag, a
-motor, a cable, and a carrier's pulses about their mean; and handle and hand, for the path is given.
+Six things are as in the closed loop: the encoder's edges, the decoder's time, the clocks up to the changed drive, the
+hold, an amplifier's delay and a converter's steps. What is behind them is left out: an amplifier's lag, a motor, a
+cable, and a carrier's pulses about their mean; and handle and hand, for the path is given.
 """
 
 from dataclasses import dataclass

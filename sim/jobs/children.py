@@ -1,7 +1,7 @@
 """Child processes that end with this process, for whatever reason it ends, and their own children with them.
 
-The children are in a process group that is led by a guard, a shell that waits for the end of a pipe from this process.
-The system closes the pipe when this process ends, even by SIGKILL, and the guard kills the group, with itself. Since a
+The children are in a process group led by a guard: a shell that waits for the end of a pipe from this process. The
+system closes the pipe when this process ends, even by SIGKILL, and the guard kills the group, with itself. Since a
 group contains the children of its members, all that a build starts ends with it.
 
 This holds on every POSIX system, for processes that stay in their group. The one thing that cannot be survived is

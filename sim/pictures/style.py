@@ -128,8 +128,8 @@ def lay_out(figure: Figure) -> None:
     """Give the panels of a figure their places, so that all that is written has room.
 
     This is the constrained layout with the places rounded. Its solver takes the equations in the order of the memory's
-    addresses, so that the last bits of its answer, and with them the names in an SVG, vary from run to run. A figure
-    does not own its layout, because it would then be laid out for each drawing, and be drawn twice to be saved.
+    addresses. So the last bits of its answer, and the names in an SVG, vary from run to run. A figure does not own its
+    layout, because it would then be laid out for each drawing, and be drawn twice to be saved.
     """
     ConstrainedLayoutEngine().execute(figure)
     for axes in figure.axes:

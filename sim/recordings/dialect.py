@@ -7,11 +7,11 @@ The rules, in this order:
 - Separator. It is the first of tab, semicolon, comma and spaces that the first other line has, outside quotes. A comma
   that leaves two numbers beside each other in a cell is a decimal comma: then spaces separate.
 - Decimal comma. Where no comma separates, a cell `1,5` is the number 1.5.
-- Names. The first line names the columns if one of its cells is neither a number, nor a time, nor a word for nothing
-  such as `n/a`. A line that also has numbers is a row instead if one of them is a time or has a decimal point, or if
-  its other cells stand over texts alone. If the first line does not name the columns, the last comment before it does,
-  provided that it has as many cells, and one of them is no number.
-- A comment `Channels (2/8): A, B` of sigrok names the columns that a header calls `logic`, and a comment
+- Names. The first line names the columns if one of its cells is no number, no time, and no word for nothing
+  such as `n/a`. A line that also has numbers may be a row instead: if one of them is a time or has a decimal point, or
+  if its other cells stand over texts alone. If the first line does not name the columns, the last comment before it
+  may. It must have as many cells, and one of them must be no number.
+- A comment `Channels (2/8): A, B` of sigrok names the columns that a header calls `logic`. A comment
   `Samplerate: 1 MHz` or `Sample rate: 1e+06Hz` is the rate of rows without times.
 """
 

@@ -10,12 +10,12 @@ recording, where one side is missing, the largest of the other steps stands for 
 two opposite steps, which do not support each other. Where samples are missing, a step may be any.
 
 The range of the counter. If its width is given, every step is taken modulo its range. If it is not, steps are taken
-modulo 2**`SPAN_BITS`. The range may be smaller if this leaves a step that is no motion, or a step over missing samples
-that is faster than all others. For angles that span no more it is then one turn. For others it is the least power of
-two that holds all counts, 8 to 31 bits, provided that
+modulo 2**`SPAN_BITS`. The range may be smaller if this leaves a step that is no motion, or the fastest step is over
+missing samples. For angles that span no more it is then one turn. For others it is the least power of two that holds
+all counts, 8 to 31 bits, provided that
 
-- every step across the end of the range, once unwrapped, differs from the median of its neighbours by at most their
-  spread, or `CLOSE` of the smallest steps; over missing samples it is no faster than the other steps; and
+- every step across the end of the range, once unwrapped, is close to the median of its neighbours: within their spread,
+  or `CLOSE` of the smallest steps; over missing samples it is no faster than the other steps; and
 - no step is longer than a quarter of the range, so that its direction is beyond doubt.
 
 A file that does not meet both has another fault than a counter that wrapped, and is refused. Of a width that is given,
@@ -151,7 +151,7 @@ class Steps:
         return not self._misfits(within, wraps, 1).size
 
     def _misfits(self, within: np.ndarray, wraps: np.ndarray, spreads: int) -> np.ndarray:
-        """Return the steps across the end of a range that differ from their neighbours by more than so many spreads,
+        """Return the steps across the end of a range that differ from their neighbours: by more than so many spreads,
         and `CLOSE` of the smallest steps."""
         places = np.flatnonzero(wraps & ~self._gaps)
         if len(within) <= 2 * BESIDE or not len(places):

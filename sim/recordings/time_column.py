@@ -1,11 +1,12 @@
 """Which column of a file tells of time, and in which unit.
 
-The column is `--time`, or `NAME.time` for counts in a column `NAME`, or `time_s`. Else it is the first one whose name
-is `t`, `time`, `timestamp`, `stamp`, `clock` or `elapsed`, with or without a unit at the end, or a unit alone, such as
-`seconds`. A file without names has none but `--time`.
+The column is `--time`, or `NAME.time` for counts in a column `NAME`, or `time_s`. Else it is the first one with one of
+these names: `t`, `time`, `timestamp`, `stamp`, `clock` and `elapsed`, with or without a unit at the end; or a unit
+alone, such as `seconds`. A file without names has none but `--time`.
 
-The unit is `--time-unit`, or the one in the name. Without either, timestamps are ISO, and numbers have the unit that
-alone of `s`, `ms`, `us` and `ns` makes their rate one of `USUAL_HZ`, the rates of logs.
+The unit is `--time-unit`, or the one in the name. Without either, timestamps are ISO.
+Numbers then get their unit from their rate: only one of `s`, `ms`, `us` and `ns` makes it one of `USUAL_HZ`, the rates
+of logs.
 """
 
 import re

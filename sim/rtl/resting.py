@@ -7,8 +7,8 @@ whether this holds for the registers in `COUNTERS`, and their stops: the values 
 **What is checked.** A counter reaches the rest of the component through nothing but
 
 - comparisons with a constant, its stops: the bit of such a comparison may go anywhere;
-- the data of registers behind decisions (multiplexers, assignments under a condition) that are not the counter's, as a
-  word in which its lowest bit stands as it is: the latch of a stamp.
+- the data of registers behind decisions that are not the counter's (multiplexers, assignments under a condition), as a
+  word with its unchanged lowest bit: the latch of a stamp.
 
 Its own next value is, behind such decisions again, its successor, itself, or what is not made of counters. What is
 `shown` is not made of counters, and all registers have one clock and no asynchronous reset.

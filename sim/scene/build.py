@@ -191,8 +191,8 @@ def sweep_of(scene: Scene, world: World, controller: object) -> Sweep | None:
 def start_of(scene: Scene, world: World) -> Progress:
     """Return the start of a run, under the push alone. If samples overlap, as many more are taken there.
 
-    The handle is at rest or, with a phase, has been pushed from rest for that part of a period of the force, and is at
-    the place of the start then.
+    The handle is at rest at the place of the start. With a phase, it has been pushed from rest for that part of a
+    period of the force and is then at this place.
     """
     protocol = scene.protocol
     cell, position_m = locate(world.encoder, protocol.start_m), protocol.start_m

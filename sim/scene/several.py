@@ -1,7 +1,7 @@
 """A scene of several axes: every one of them is a scene of its own, and all share one pipeline.
 
 What is shared is the hardware, and the length of the run: `shared` names these keys. An axis may have any other key of
-its own, for its device and its wall, and for the words of the hardware that the host writes.
+its own: for its device, its wall, and the words of the hardware that the host writes.
 """
 
 from collections.abc import Sequence

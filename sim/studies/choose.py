@@ -26,9 +26,9 @@ SITUATIONS: Situations = {
     "bad encoder": {"signal": "paper", "encoder": {"encoder.phase_error_counts": PHASE_ERROR_COUNTS}},
     "single edges": {"signal": "paper", "encoder": {"encoder.edge_error_counts": EDGE_ERROR_COUNTS}},
 }
-"""Motions of a handle: about 1 and 300 mm/s (not round speeds, whose counts lock to the samples), the paper's swing, a
-hit of a wall, and a count that flickers. Two more are the swing seen by bad encoders: the errors of the first repeat
-every four edges, in the second each edge has its own error."""
+"""Motions of a handle: about 1 and 300 mm/s; the paper's swing, a hit of a wall, and a count that flickers. Round
+speeds are avoided: their counts lock to the samples. Two more are the swing seen by bad encoders: the errors of the
+first repeat every four edges, in the second each edge has its own error."""
 OWN = "own encoder"
 """The situation of an encoder that the user describes: the swing, too."""
 

@@ -11,7 +11,7 @@ paper's axes:
 
 The scene's own values are one of the first trials, so a fit can continue from an earlier fit. Trials are mapped in
 coarse steps, on a shortened protocol. If the region of Levant with adjusted gains ends far (`FAR`) from the end of the
-B axis, the other maps are not made, and no fact holds. The `FINALISTS` with the least sum are then judged in full: in
+B axis, the other maps are not made. No fact holds then. The `FINALISTS` with the least sum are then judged in full: in
 fine steps, on the scene's own protocol.
 """
 

@@ -6,8 +6,8 @@ For given w_i the a_i and b_i follow from linear least squares, so only the w_i 
 sines are found one after the other; the search for a sine begins where the spectrum of the residual of the previous
 sines is strongest.
 
-Two sines of one frequency that cancel would fit a little better the larger they are, without an end, and the last bit
-of a sum would choose where the search stops. So an amplitude costs something, and the derivatives by w are exact.
+Two sines of one frequency that cancel fit a little better the larger they are, without an end. The last bit of a sum
+would then choose where the search stops. So an amplitude costs something, and the derivatives by w are exact.
 """
 
 from dataclasses import dataclass

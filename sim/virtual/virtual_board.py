@@ -24,7 +24,7 @@ TURN_M = 4e-3
 HOLD_PER_S = 30.0
 """How fast a hand brings the handle to where it holds it: the rate of a critically damped spring."""
 GRASP_S = 1e-3
-"""The time for which the hand's force is constant, s; much shorter than 1 / `HOLD_PER_S`."""
+"""The time in which the hand's force is constant, s; much shorter than 1 / `HOLD_PER_S`."""
 
 
 @dataclass

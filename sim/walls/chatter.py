@@ -4,7 +4,8 @@ At a constant count some estimators do not come to rest: they go through one of 
 force is updated only once in several samples, and takes one value of the cycle each time. These values are the cycle's
 alias, which may be a single value: a constant velocity where there is none.
 
-A handle with Coulomb friction f_c, pushed by P into a wall (K, B), rests at x if for every value u that the force takes
+A handle with Coulomb friction f_c is pushed by P into a wall (K, B). It rests at x if, for every value u that the force
+takes,
 
     |P - K x - B u| <= f_c,    and x > 0.
 

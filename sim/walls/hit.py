@@ -94,10 +94,10 @@ class Hit(Summary):
     def in_place(self) -> bool:
         """Whether the handle rests where the wall's spring alone would hold it.
 
-        At rest the velocity is 0, and the spring carries the push and the hand, up to the friction that sticks, a step
-        of the output and the position hidden in a count. A stable wall may be felt elsewhere: where the estimate is not
-        0 at rest, its damper carries a part. In the literal protocol, the mean after the settling mark is not farther
-        from the mean before it than the RMS.
+        At rest the velocity is 0, and the spring carries the push and the hand. The remainder is at most the sticking
+        friction, a step of the output and the position hidden in a count. A stable wall may be felt elsewhere: where
+        the estimate is not 0 at rest, its damper carries a part. In the literal protocol, the mean after the settling
+        mark is not farther from the mean before it than the RMS.
         """
         scene, stiffness = self.scene, self.scene.felt_n_per_m
         hand, cable = scene.hand, scene.transmission

@@ -14,8 +14,8 @@ taken as one. So are the windows before them, back to the first one that begins 
 are the last window and the one before. Where there are not enough, the run goes on as well.
 
 The first window has one before it too, which ends at the settling mark. A handle that creeps, or comes to rest in
-another place, is not unstable for that. Beside the verdict the report has the *offset*, from the mean over `mean_s`
-before the mark to the mean of the judged window, and the *drift*.
+another place, is not unstable for that. Beside the verdict the report has the *drift* and the *offset*: from the mean
+over `mean_s` before the mark to the mean of the judged window.
 
 The founding paper's protocol, `verdict = "literal"`, has one window, and takes the RMS distance from the mean before
 the mark. Its square is the sum of three squares: the distance from the line, the offset, and the spread by the drift.

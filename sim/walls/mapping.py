@@ -1,8 +1,8 @@
 """Maps of stable walls, and who makes them for a study.
 
-A map asks for one wall at a time, and all starts of a wall are hit side by side, as are walls of different maps; every
-verdict is kept as it comes. A verdict depends on the scene, the wall and the start alone, so the map is the same for
-any pool, and an interrupted map continues where it was, also with more starts.
+A map asks for one wall at a time. All starts of a wall are hit side by side, as are walls of different maps; every
+verdict is kept as it comes. A verdict depends on the scene, the wall and the start alone. So the map is the same for
+any pool. An interrupted map continues where it was, also with more starts.
 """
 
 import platform
@@ -129,8 +129,8 @@ def verdict(
 class _Mapping:
     """A map in progress: the jobs that it asks for next, by variant and start, and at the end the map.
 
-    Every wall is hit in all variants of the case. The search is sent the verdicts of the worst of them so far, and the
-    map is of the walls as the worst variant had them.
+    Every wall is hit in all variants of the case. The search gets the verdicts of the worst variant so far. The map has
+    each wall's verdicts by its worst variant.
     """
 
     def __init__(self, case: Case, backend: str, starts: int):

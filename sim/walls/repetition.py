@@ -2,8 +2,7 @@
 
 The loop is a function: plant, encoder, drives on their way and controller after a sample follow from those before it,
 and from nothing else. Time enters by differences alone. So a loop that is in one state twice goes through all states in
-between for ever, and if the handle did not move in between it never will. Equal is exact: no digit of any number
-differs.
+between for ever. If the handle did not move in between, it never will. Equal is exact: no digit of any number differs.
 
 Two things are left out, because no such future sees them: the stamps of edges, if the estimator uses none; and the
 number of the sample, with which the clock of the decoder must be in step. Some loops never count as repeating:

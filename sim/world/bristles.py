@@ -7,9 +7,9 @@ the Coulomb level Fc, the static level Fs, the Stribeck speed vs, and with s = s
     g(v) = Fc + (Fs - Fc) exp(-(v / vs)^2)
 
 Dahl's model has g = Fc and D = 0. While v keeps its sign and the applied force F is constant, all of it is analytic. So
-a leg of h seconds is a power series in the time t / h, whose terms up to an order N are computed by recurrence. LuGre's
-exponential f = exp(-(v / vs)^2) is one more state, df/dt = -(2 / vs^2) v (dv/dt) f, so that the rest are products and
-the quotient 1 / g.
+a leg of h seconds is a power series in the time t / h. Its terms up to an order N are computed by recurrence. LuGre's
+exponential f = exp(-(v / vs)^2) is one more state, df/dt = -(2 / vs^2) v (dv/dt) f. The rest are products and the
+quotient 1 / g.
 
 **What the series leave out.** The size |A| of a series is the sum of the magnitudes of its terms. No value of it on the
 leg is larger, and |A B| <= |A| |B|. Let the terms beyond order N of v, z and f have sizes rv, rz and rf, and carry them

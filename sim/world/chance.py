@@ -1,8 +1,8 @@
 """Random numbers that are functions of a seed and of two whole numbers: nothing is kept from one to the next.
 
-A number that is asked for again is the same again, and one in the middle of a long row costs no more than the first.
-The words are mixed by multiplications and shifts of 32 bits (see `mixed`), computed in 64 so that compiled code and
-plain Python agree.
+A number asked for again is the same again. One in the middle of a long row costs no more than the first. The words are
+mixed by multiplications and shifts of 32 bits (see `mixed`), computed in 64 so that compiled code and plain Python
+agree.
 """
 
 import math

@@ -10,7 +10,7 @@ It uses the same tables in steps of `step_s`; the last step before the command c
 - the voltage is within its limits, or at one of them, for a whole step.
 
 The error is of the order of a step. A scene may not have steps in which the device itself diverges (`longest_s`). In
-shorter steps a limited force moves the device by a bounded amount, so that a run has numbers to its end and an unstable
+shorter steps a limited force moves the device by a bounded amount. So a run stays finite until it ends, and an unstable
 wall gets its verdict, as with the other solvers.
 """
 

@@ -126,7 +126,7 @@ def waiting(lines: Lines | None, level: int, edges: Edges) -> Waiting | None:
 
 @compiled
 def _insert(kept, clock, line):
-    """Add a toggle to the coming ones, after those of the same clock; return whether there was room."""
+    """Add a toggle to the coming ones, after the toggles of the same clock; return whether there was room."""
     clocks, lines, count = kept.toggles.clocks, kept.toggles.levels, kept.marks[PENDING]
     if count == len(clocks):
         return False

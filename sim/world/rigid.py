@@ -2,15 +2,16 @@
 
     m dv/dt = F - b v - Fc sign(v),   dx/dt = v,   and v = 0 for as long as the handle rests and |F| <= Fc
 
-The applied force F is constant over an interval (zero-order hold), so the motion is known in closed form. With
-z = -b t / m, phi1(z) = (e^z - 1) / z and phi2(z) = (phi1(z) - 1) / z (the first columns of the matrix exponential),
-and `net` the force left after Coulomb friction,
+The applied force F is constant over an interval (zero-order hold), so the motion is known in closed form. Let z = -b t
+/ m, phi1(z) = (e^z - 1) / z and phi2(z) = (phi1(z) - 1) / z, the first columns of the matrix exponential. With `net`
+the force left after Coulomb friction,
 
     v(t) = v0 + v0 (e^z - 1) + net t phi1(z) / m
     x(t) = x0 + v0 t phi1(z) + net t^2 phi2(z) / m
 
 All terms of a row are computed to a few units in the last place for every z, b = 0 included. The velocity is monotone
-while `net` is constant, so an interval holds at most one turn (an instant of zero velocity), and its time is known too.
+while `net` is constant. So an interval holds at most one turn (an instant of zero velocity), and its time is known,
+too.
 
 Intervals of equal length share their coefficients: a `Span` is computed once, and only an interval that is cut by an
 event (a turn, an encoder edge) evaluates exponentials and logarithms. Stick and slip are events at their exact time,

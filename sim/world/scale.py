@@ -87,8 +87,7 @@ def displacement(scale, number):
 def near(scale, counts):
     """Return the number of an edge within a few of a place on the scale (counts), however far the waves carry edges.
 
-    A wave moves an edge by less than half of what it moves the neighbour from its own place, so that each step halves
-    the distance.
+    A wave moves an edge by less than half of the neighbour's displacement. So each step halves the distance.
     """
     number = math.floor(counts)
     for _ in range(SETTLED):

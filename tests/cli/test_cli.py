@@ -109,7 +109,7 @@ OF_ONE_AXIS_ALONE = ("bench", "cutoff", "drop", "fit", "gains", "lipschitz", "ra
         ),
         (["hit", "--beside", "no-such"], "scene must be one of "),
         (["hit", "--beside", "eight-axes"], "--beside needs scenes of one axis: eight-axes has several"),
-        (["hit", "eight-axes", "--beside", "mhz"], "side by side, and eight-axes has several"),
+        (["hit", "eight-axes", "--beside", "mhz"], "--beside needs scenes of one axis: eight-axes has several"),
         (["hit", "--beside", "mhz", "--trace", "a.npz"], "--trace must be absent with --beside"),
         (["hit", "--plot", "a.gif"], "--plot a.gif needs --beside: only hits side by side are drawn in motion"),
         (["rates", "--plot", "a.gif"], "--plot must end in .pdf or .png or .svg, not 'a.gif'"),
