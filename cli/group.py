@@ -79,7 +79,7 @@ class LazyGroup(TyperGroup):
 def loaded(name: str) -> Any:
     """Import the module of a command; return the command with its options.
 
-    The modules have the names of `COMMANDS`: a table of 30 imports would load them all, for a help that needs none.
+    The modules have the names of `COMMANDS`: a table of 30 imports would load them all; a help needs none.
     """
     alone = typer.Typer(add_completion=False)
     alone.command(name, help=COMMANDS[name])(import_module(f".{name}", __package__).command)

@@ -14,7 +14,7 @@ class StdoutError(RuntimeError):
     """Stdout cannot be written.
 
     Attributes:
-        code: the exit code; the message is empty if nobody reads stdout any more, for then there is no fault.
+        code: the exit code; the message is empty if nobody reads stdout any more, because this is no fault.
     """
 
     def __init__(self, error: OSError):

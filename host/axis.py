@@ -405,7 +405,7 @@ class Axis(Named):
             except StopIteration as end:
                 return end.value.position_m
             if time.monotonic() > until:
-                raise TimeoutError(f"in {seconds:g} s there was not {waits_for}")
+                raise TimeoutError(f"in {seconds:g} s the axis did not see {waits_for}")
             self.sleep(HOMING_S)
 
     def _why_not(self, status: Status) -> str:

@@ -85,9 +85,9 @@ class Axes:
     """All axes on a board, from `hardwall.host.connect_axes`. A context manager that disarms each, and closes.
 
     Each is an `Axis`, with words, states and acts of its own. The board hears one heartbeat. It continues while the
-    lease of any axis lasts. It stops beside an axis that is ARMED without a lease: one whose lease has ended, or that
-    an earlier host left ARMED. Disarm that axis, or renew its lease. `supervisor_watchdog` is one word for all axes.
-    There is one capture memory: it records the axis whose `capture` was started last.
+    lease of any axis lasts. It stops beside an axis that is ARMED without a lease: after the end of its lease, or
+    because an earlier host left it ARMED. Disarm that axis, or renew its lease. `supervisor_watchdog` is one word for
+    all axes. There is one capture memory: it records the axis whose `capture` was started last.
 
     Args:
         port: the line.

@@ -171,7 +171,9 @@ class Capture:
         """
         self._check()
         if (taken := self._taken) != self._axis:
-            raise NotReadyError(f"the capture is of axis {taken}, and not of axis {self._axis}: start one of this axis")
+            raise NotReadyError(
+                f"the capture is of axis {taken}, not of axis {self._axis}: start a capture of this axis"
+            )
         self._board.pulse("capture_trigger")
 
     def until(self, wanted: str, seconds: float) -> None:
@@ -207,7 +209,7 @@ class Capture:
             progress(done)
 
     def reading(self) -> Generator[int, None, Captured]:
-        """Read a capture that is done, a request at a step, for who has more to do between two.
+        """Read a finished capture, one request per step, so that a caller can do other things in between.
 
         Yields the number of records that are read, and returns the capture.
 

@@ -146,7 +146,7 @@ class Config:
         try:
             axis.set(**{**before, **self.words})
             if left := self.differences(axis):
-                raise HostError(f"the board has not taken {', '.join(each.name for each in left)}")
+                raise HostError(f"the board did not take the words {', '.join(each.name for each in left)}")
         except HostError as error:
             raise _undone(axis, before, error) from error
 
@@ -180,8 +180,10 @@ def _undone(axis: Axis, before: dict[str, float], error: HostError) -> HostError
     with suppress(HostError):
         axis.set(**before)
         if all(axis.get(name) == value for name, value in before.items()):
-            return HostError(f"nothing was loaded, for the board did not take all: {error}")
-    return HostError(f"some words may be loaded and others not, for the board does not answer: load again ({error})")
+            return HostError(f"nothing was loaded, because the board did not take all: {error}")
+    return HostError(
+        f"some words may be loaded and others not, because the board does not answer: load again ({error})"
+    )
 
 
 def _facts(device: Device) -> dict[str, Any]:

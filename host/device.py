@@ -85,7 +85,7 @@ def read_device(port: Port) -> Device:
     said = port.identify()
     if said.get(0) != VENDOR:
         raise ForeignError(
-            f"what answers at {port.name} is {said.get(0, b'?').decode(errors='replace')!r}, no hardwall"
+            f"the device at {port.name} is {said.get(0, b'?').decode(errors='replace')!r}, not a hardwall board"
         )
     constants = port.read(CONSTANTS, TELEMETRY - CONSTANTS)
 
@@ -94,8 +94,8 @@ def read_device(port: Port) -> Device:
 
     if constant(LAYOUT_AT) != LAYOUT:
         raise ForeignError(
-            f"the device at {port.name} has the layout {constant(LAYOUT_AT)} of registers, and this version knows "
-            f"{LAYOUT}: take the version of hardwall that its bitstream was made with"
+            f"the device at {port.name} has the register layout {constant(LAYOUT_AT)}; this hardwall knows "
+            f"{LAYOUT}: use the version of hardwall that made its bitstream"
         )
     size = constant(MAP_AT)
     if not 0 < size <= 2 * (SPACE - MAP):

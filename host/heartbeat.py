@@ -51,7 +51,7 @@ class Beat:
                 last = self._read()
                 if last not in self._numbers:
                     raise ChangedError(
-                        f"the board at {self._port.name} has not the last beat of this program: it was reset, or "
+                        f"the board at {self._port.name} does not have this program's last beat: it was reset, or "
                         "another host writes to it; connect again"
                     )
                 following = last % self._register.high + 1

@@ -39,7 +39,7 @@ class Board(Protocol):
 
 
 def homing(axis: Board, index_m: float) -> Generator[str, None, Homed]:
-    """Home an axis, a look at it at a step, for who has more to do between two.
+    """Home an axis, one look at it per step, so that a caller can do other things in between.
 
     The handle may move all the time: the board latches the place of the index, and moves its origin at one clock.
 

@@ -38,7 +38,7 @@ class Relayed(NamedTuple):
     frame: bytes
 
     def isError(self) -> bool:
-        """Whether it must be shown as an error: never, for it is another program's to judge."""
+        """Whether it must be shown as an error: never, because another program must judge it."""
         return False
 
 

@@ -64,9 +64,8 @@ class Words:
             last = self._last(name)
             if word not in (last, self._tried.get(name, last)):
                 raise ChangedError(
-                    f"the board at {self._port.name} has {self._si(name, word):g} in {name}, and not "
-                    f"{self._si(name, last):g} as it was written: it was reset, or another host "
-                    "writes to it; connect again"
+                    f"the board at {self._port.name} has {self._si(name, word):g} in {name} instead of "
+                    f"the written {self._si(name, last):g}: it was reset, or another host writes to it; connect again"
                 )
         self._written, self._tried = found, {}
 

@@ -163,7 +163,7 @@ def _tell(found: dict[str, float], flags: list[str], hint: str = "") -> None:
     """Warn the caller's caller of bounds that come from the record, and of flags."""
     if found:
         said = ", ".join(f"{name}={value:.6g}" for name, value in found.items())
-        warnings.warn(f"{said}: from the record, because not given{hint}", RecordWarning, stacklevel=3)
+        warnings.warn(f"{said}: taken from the record, because not given{hint}", RecordWarning, stacklevel=3)
     if flags:
         cures = "; a larger speed_max may help" if "velocity_saturated" in flags else ""
         warnings.warn(f"raised flags: {', '.join(flags)}{cures}{hint}", RecordWarning, stacklevel=3)

@@ -120,7 +120,7 @@ class AxesBoard(wiring.Component):
 
     @property
     def safe_latency(self) -> int:
-        """Clock edges from the first one that sees the fault loop open, to the one that makes the pulses low."""
+        """Clock edges from the first that sees the fault loop open until the pulses are low."""
         return self.axes.loop_latency + self.stages[0].design.safe_latency
 
     def elaborate(self, platform):

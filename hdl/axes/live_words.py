@@ -20,7 +20,7 @@ class Writing(NamedTuple):
 
 
 class LiveWords:
-    """The live words of every axis, each in a memory of its own, for it is written alone.
+    """The live words of every axis, each in its own memory, because it is written alone.
 
     Args:
         pipe: the pipeline; in its first rota after a reset every axis takes its reset words in stage 0.

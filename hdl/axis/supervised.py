@@ -98,7 +98,7 @@ class SupervisedAxis(wiring.Component):
 
     @property
     def loop_latency(self) -> int:
-        """Clock edges from the first one that sees a loop open, to the one that zeroes the drive; both included."""
+        """Clock edges from the first that sees a loop open to the zeroing of the drive, both included."""
         return 3
 
     def elaborate(self, platform):

@@ -16,8 +16,8 @@ class Pdm(Block):
     Equation: as in `hardwall.model.drive.pdm`: 2**N clocks of a steady amount have exactly `amount` pulses.
 
     Safe is `drive_pdm` low: at once, through a gate alone, where `permitted` is low, and one clock after the axis is
-    not ARMED, for its drive is zero then. With an amplifier in the stage the drive passes a scaling. `armed` is looked
-    at after the scaling, so it takes one clock, too.
+    not ARMED, because its drive is zero then. With an amplifier in the stage the drive passes a scaling. `armed` is
+    looked at after the scaling, so it takes one clock, too.
 
     Latency: `latency` clocks from a drive to the first pulse that it makes.
 

@@ -60,9 +60,9 @@ class Quadrature(wiring.Component):
     Equation: with (A, B) in the order 00, 10, 11, 01, 00 every edge of the filtered pins counts +1, in the other order
     -1; `invert` swaps the signs. So in a cycle of 4 counts A rises at 0, B rises at 1, A falls at 2, B falls at 3.
 
-    Latency: `latency(glitch_clocks)` = glitch_clocks + 4 clock edges, from the first one that sees a changed pin to the
-    one that sets the new count, both included. Two are for the synchroniser, glitch_clocks + 1 for the filter and one
-    to decode and add. Throughput: one edge a clock. All three pins have the same delay.
+    Latency: `latency(glitch_clocks)` = glitch_clocks + 4 clock edges, from the first that sees a changed pin to the
+    setting of the new count, both included. Two are for the synchroniser, glitch_clocks + 1 for the filter and one to
+    decode and add. Throughput: one edge a clock. All three pins have the same delay.
 
     Filter: a channel takes a new level once that level was seen at glitch_clocks + 1 successive clocks. A pulse
     shorter than glitch_clocks clocks never passes, and a pulse longer than glitch_clocks + 1 clocks always passes,
@@ -91,7 +91,7 @@ class Quadrature(wiring.Component):
     elsewhere upwards than downwards. It is then a count off.
 
     Slip: after `illegal`, `overspeed`, `wrapped`, another `invert` or `slip` the count belongs no more to the scale. In
-    that clock `index_latched` and `referenced` fall. `preload` makes them fall too, for nobody knows by how much it
+    that clock `index_latched` and `referenced` fall. `preload` makes them fall too, because nobody knows by how much it
     moves the count.
 
     Rounding and overflow: nothing is rounded. `count`, `index_count` and the stamps wrap, `illegal_count` saturates. An

@@ -203,7 +203,7 @@ class PanelServer:
         bench: what is beside a virtual board; None at a real one.
         title: the title of the page.
         at: where it is served; the socket is closed at the end.
-        token: what the address begins with, for who knows it alone.
+        token: the secret beginning of the page's address.
 
     Attributes:
         url: the address of the page, with its token.

@@ -6,7 +6,7 @@ Whoever has the token may arm the board. So a token is kept only where it can be
   else may write to. A file that is anything else is not believed: it is removed, and the page has a new address.
 - It is kept only for a page at this machine itself. At another address the token goes through a network without
   encryption, where a listener could learn it, and would then have it for ever.
-- There is a file a port, for an address of a page names its port.
+- There is one file per port, because a page's address names its port.
 """
 
 import ipaddress

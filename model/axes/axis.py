@@ -86,9 +86,9 @@ class AxesSpec(DesignedAxis):
         check_int("axes", self.axes, 1, AXES_MAX)
         super().__post_init__()
         if self.passivity:
-            raise FieldError("passivity", "must be False, for axes that share their logic have no such controller")
+            raise FieldError("passivity", "must be False: axes that share their logic have no such controller")
         if self.coupling:
-            raise FieldError("coupling", "must be False, for axes that share their logic have no moving surfaces")
+            raise FieldError("coupling", "must be False: axes that share their logic have no moving surfaces")
         if self.estimator not in PIPELINES:
             raise FieldError("estimator", f"must be one of {', '.join(PIPELINES)}, not {self.estimator!r}")
         if self.clocks_per_sample < self.slots:

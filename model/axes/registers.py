@@ -27,7 +27,7 @@ from .capture import Design as Capture
 from .supervised import Design
 
 OF_THE_HOST = "heartbeat", "supervisor_watchdog"
-"""Live words that there are once, for there is one host."""
+"""Live words that exist once, because there is one host."""
 OF_CAPTURE = "capture_"
 """How the names of what there is of the capture memory begin."""
 BANK = END

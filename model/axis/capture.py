@@ -21,9 +21,9 @@ The states; all but the first and the last take a record of every `capture_decim
     TRIGGERED  all records are kept until the ring is full
     DONE       the ring is full, and frozen until the next start
 
-A trigger is taken in FILLING too, for what comes early is not to be lost: then fewer records are before it, and more
-behind it. When the capture is DONE every record of the ring belongs to it, `capture_place` of them before the trigger.
-The record at that place is the one taken at the trigger, or else the next.
+A trigger is taken in FILLING too, so that an early one is not lost: then fewer records are before it, and more behind
+it. When the capture is DONE every record of the ring belongs to it, `capture_place` of them before the trigger. The
+record at that place is the one taken at the trigger, or else the next.
 
 The triggers are the host's `capture_trigger`, and the `SOURCES` whose bits are set in `capture_sources`. A trip counts
 at its clock. The other triggers are found by comparing one sample with the next. Both samples come after the start;

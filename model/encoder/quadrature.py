@@ -155,8 +155,8 @@ LATENCY = 4
 
 
 def latency(glitch_clocks: int) -> int:
-    """Return the number of clock edges from the first one that sees a changed pin to the one that sets the new count,
-    both included.
+    """Return the number of clock edges from the first that sees a changed pin to the setting of the new count, both
+    included.
 
     The synchroniser takes two, the filter `glitch_clocks` + 1, and decoding and adding one.
     """

@@ -13,7 +13,7 @@ Derivation. A is STEEPER times the axis's bound on the acceleration, and q a cou
 accepts: two neighbours are less than 2 q apart, and three span more than q. Then:
 
 - In a silence of S the axis stays within 2 q, so it is at some time no faster than 2 q / S. Until the end of the
-  silence it gains at most 2 sqrt(A q), for it has no more than 2 q to do so; and until t later A t more.
+  silence it gains at most 2 sqrt(A q), because it has at most 2 q for this; and until t later A t more.
 - Three edges in a time of T < S / 4 mean a speed above q / T. 2 q / S is less than half of it.
 - So a motion with less than A has T > q / (4 sqrt(A q) + 2 A t) after every silence. `span` is this bound, with t the
   `window` of samples in which the three edges must come; the window is as long as the bound for t = 0, and a sample.

@@ -14,7 +14,7 @@ edges v = 0.
 
 N is the number of the edge itself, `count + down`, not the count. After a turn the same edge has the same number. So v
 is the mean velocity between two instants of known position, whatever the direction. It has the edges' errors in full,
-for any two edges may be of different kinds: what repeats every four edges, `period` is immune to.
+because any two edges may be of different kinds: what repeats every four edges, `period` is immune to.
 
 Guarantee. Let |f''| <= C counts/sample^2, and each edge be displaced by at most p counts. Then v over W samples is off
 by at most C W / 2 from acceleration and 2 p / W from the edges. For W between `half` and twice that, the sum is at most

@@ -16,7 +16,7 @@ NETWORK = "tcp://"
 PACE_LEAST = 1e-3
 """The slowest board, in its seconds in a second."""
 MARGIN = 3.0
-"""By how much its hosts are told less than its pace, for a machine is not always as fast."""
+"""The margin by which hosts are told less than its pace, because a machine is not always equally fast."""
 CHANGE = 0.1
 """The part by which a pace is another one."""
 FIRST_S = 5.0

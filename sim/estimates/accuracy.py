@@ -65,8 +65,8 @@ def _device() -> AxisSpec:
 def errors_of(encoder: dict[str, Any] | None) -> Errors:
     """Return the errors of an encoder, given as changes of the scene's keys `encoder.KEY`, with `LEARNED` or without.
 
-    A phase error alone may be as large as the order of edges allows, for the axis has no glitch filter; together with
-    other errors it has the limits of a scene.
+    A phase error alone may be as large as the order of edges allows, because the axis has no glitch filter; together
+    with other errors it has the limits of a scene.
 
     Raises:
         ValueError: if the errors are not valid.

@@ -2,7 +2,7 @@
 
 Six things are as in the closed loop: the encoder's edges, the decoder's time, the clocks up to the changed drive, the
 hold, an amplifier's delay and a converter's steps. What is behind them is left out: an amplifier's lag, a motor, a
-cable, and a carrier's pulses about their mean; and handle and hand, for the path is given.
+cable, and a carrier's pulses about their mean; and handle and hand, because the path is given.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,8 @@
 """The readback of a bitstream, compared with the placed and routed design of nextpnr.
 
 Of an iCE40 every bit of every tile is compared. The unpackers of the others write a configuration in other words than
-nextpnr does, for a default may be said or left out. Of these it is the part, the contents of every logic cell that has
-a function, by its place, and the switches of the wires; and of an ECP5 all memories.
+nextpnr does: a default may be written or left out. Of these it is the part, the contents of every logic cell that has a
+function, by its place, and the switches of the wires; and of an ECP5 all memories.
 """
 
 import json

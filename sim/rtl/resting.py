@@ -17,15 +17,15 @@ Its own next value is, behind such decisions again, its successor, itself, or wh
 except the counters, which are one further after each clock. Let no counter be at a stop before, between or after the
 two clocks. All that decides then depends on what has not changed, so in both clocks every register takes its value by
 the same way. It cannot be the way from a counter: the counter's lowest bit differs in the two clocks, and the register
-would, too. So what a register takes is made of what has not changed. And a counter goes by the way of its successor,
-for by any other it would not be one further after each clock. Then the third clock begins like the second, except for
-the counters, so it takes the same paths. So does every clock up to one with a counter at a stop, or with other inputs.
+would, too. So what a register takes is made of what has not changed. And a counter takes its successor: by any other
+way it would not be one further after each clock. Then the third clock begins like the second, except for the counters,
+so it takes the same paths. So does every clock up to one with a counter at a stop, or with other inputs.
 
 **When one clock is enough.** One clock is enough instead of two under two conditions. No register that leads to the
 shown outputs takes a counter by any way. And a counter's own next value is its successor, itself or a constant. If such
 a register stays as it was, it stays so in the next clock, too. A counter that is one further has taken its successor,
-unless the constant is just that value: so the value below a constant is a stop, too. Other registers need not rest, for
-nothing that is looked at follows from them.
+unless the constant is just that value: so the value below a constant is a stop, too. Other registers need not rest,
+because no examined output follows from them.
 
 A simulation has to see these clocks each time; what it then skips is exact. If the check fails, nothing is skipped. It
 may keep more than registers from clock to clock, as Verilator does: what follows from them. All of this is compared.

@@ -75,7 +75,7 @@ class DriveSection(Section):
         for stage, needed in NEEDED.items():
             own = {key for key in given if key in needed or (stage == "dac" and key.startswith(OF_A_DAC))}
             if stage != self.stage and own:
-                raise ValueError(f"drive.{min(own)} must be absent, for drive.stage is {self.stage}, not {stage}")
+                raise ValueError(f"drive.{min(own)} must be absent, because drive.stage is {self.stage}, not {stage}")
         for key in NEEDED[self.stage]:
             if key not in given:
                 raise ValueError(f"drive.{key} is missing")

@@ -20,7 +20,7 @@ from .section import Section
 ERROR_MAX_COUNTS = 0.5
 """The distance of an edge from its ideal place from which the decoder promises nothing."""
 LEAST_CUT_SIGMAS = 2.0
-"""The random displacement of edges is cut no nearer than this, for it would be normal no more."""
+"""The random displacement of edges is cut no nearer than this; otherwise it would not be normal any more."""
 EDGE_ERROR_MAX_COUNTS = MOST_COUNTS / LEAST_CUT_SIGMAS
 """The largest sigma of edges that have no other errors."""
 TOGETHER_MAX = 1000

@@ -28,7 +28,7 @@ class HandSection(Section):
         for key in OF_A_HAND:
             given = getattr(self, key) is not None
             if given and self.model:
-                raise ValueError(f"hand.{key} must be absent, for hand.model is {self.model}, which has its own")
+                raise ValueError(f"hand.{key} must be absent, because hand.model is {self.model}, which has its own")
             if not given and not self.model:
                 raise ValueError(
                     f"hand.{key} is missing: a hand has {', '.join(OF_A_HAND)}, or is a published one by hand.model, "

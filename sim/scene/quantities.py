@@ -18,7 +18,7 @@ def number(least: float, most: float) -> Any:
 
 
 def _as_int(value: Any) -> Any:
-    """Return a float that is a whole number as an int, for that is how one writes a clock of `12e6`; else the value."""
+    """Return a float that is a whole number as an int, as people write a clock of `12e6`; else the value."""
     return int(value) if type(value) is float and value.is_integer() else value
 
 

@@ -208,7 +208,7 @@ class Contest:
         self._grid = grid_of(self.scene)
         if len(self._grid.dampings) < 2:
             key = f"{self.scene.name}: zwidth.damping_to_n_s_per_m"
-            raise SceneError(f"{key} must leave two values of B, for a map of one has no area")
+            raise SceneError(f"{key} must leave two values of B, because a map of one has no area")
         self.refused: dict[str, str] = {}
         self.curves = [replace(methods(self.scene)[method], label=method) for method in METHODS]
         self.shortcuts = shortcuts(self.scene, self._differs)

@@ -79,7 +79,7 @@ class VirtualBoard:
 
     def __init__(self, scene: Scene, baud: int | None = None, family: str | None = None):
         if scene.output is not None:
-            raise SceneError(f"{scene.name}: output must be absent, for the drive stage of the board is its output")
+            raise SceneError(f"{scene.name}: output must be absent, because the drive stage of the board is its output")
         # The board's own stage makes the steps of its force.
         self.scene, self._world = scene, world_of(scene)._replace(converter=None)
         self._progress = start_of(scene, self._world)

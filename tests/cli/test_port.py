@@ -149,7 +149,7 @@ def test_watch_shows_a_line_and_home_finds_the_index(virtual, called):
     done = called("home", virtual.path, "--seconds", "0.2")
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == (
-        "hardwall: error: in 0.2 s there was not the index: move the handle over it"
+        "hardwall: error: in 0.2 s the axis did not see the index: move the handle over it"
     )
     with started(HARDWALL, "home", virtual.path, "--at", "0.1", "--json", *AT) as process:
         assert process.stderr.readline() == "move the handle over its index\n"

@@ -240,7 +240,7 @@ def test_a_load_whose_commit_fails_leaves_what_was_before(board, file, axis, reg
         return answer
 
     board.server.take = take
-    with pytest.raises(HostError, match="nothing was loaded, for the board did not take all: the board refuses"):
+    with pytest.raises(HostError, match="nothing was loaded, because the board did not take all: the board refuses"):
         config.load(axis, differences)
     assert silent
     after = words_of(board)

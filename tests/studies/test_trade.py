@@ -205,7 +205,7 @@ def test_a_scene_that_lacks_a_part_has_no_shortcut_without_it(hardware):
             ["--set", "controller.output=u1"],
             "--set 'controller.output' must be absent (this command sets it): it takes two",
         ),
-        (["--starts", "4"], "--starts must be 5 or more, for fewer tell no move from chance, not 4"),
+        (["--starts", "4"], "--starts must be 5 or more, because fewer cannot tell a move from chance, not 4"),
         (["--plot", "trade.gif"], "--plot must end in .pdf or .png or .svg"),
     ],
 )
