@@ -155,7 +155,7 @@ class Divisionless(wiring.Component):
                 m.next = f"SHIFT_{each + 1}" if each + 1 < passes else "LOOK"
 
     def _take_dividend(self, m: Module, s: SimpleNamespace) -> None:
-        """Take the shifted dividend; what is above its place is a quotient that does not fit."""
+        """Take the shifted dividend; bits above its place mean a quotient that does not fit."""
         m.d.sync += [s.x.eq(self.product), s.over.eq(s.over | self.product[len(s.x) :].any())]
 
     def _invert(self, m: Module, s: SimpleNamespace) -> None:
@@ -182,7 +182,7 @@ class Divisionless(wiring.Component):
             m.next = "LOAD"
 
     def _correct(self, m: Module, s: SimpleNamespace) -> None:
-        """Add the states that make the digits, each from the top of what the ones before it leave."""
+        """Add the states that make the digits, each from the top of the remainder so far."""
         point, digit = len(s.remainder) - 1, self._digit
         loading, last = Signal(), Signal()
         leading = s.remainder[point - digit :]

@@ -20,7 +20,7 @@ class Pulses:
 
     Attributes:
         names: the names of all pulses.
-        marks: those that are written.
+        marks: the written ones.
         wanted: the pulses that address and value ask for.
         exclusive, after: the exclusive pulses of the frame so far, and the same with the wanted pulses.
         several: whether one of these is refused.

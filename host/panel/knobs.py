@@ -81,7 +81,7 @@ class Knob:
     """A word as a page shows it.
 
     Attributes:
-        name: the word's name; label: what it is called; group: what it is for.
+        name: the word's name; label: its name on the page; group: its purpose.
         unit: the unit that is shown; scale: how many of it the SI unit has.
         least, most, step: the word's range and its 1, in SI units.
         way: how a value goes along the slider: `DECADES` for values that a hand feels by ratios; `CUBE` for signed

@@ -95,7 +95,7 @@ class Design:
 
     @property
     def committed(self) -> tuple[Word, ...]:
-        """Words that a host may write and that take effect together, at a sample after a commit."""
+        """Words that a host may write; they take effect together, at a sample after a commit."""
         return tuple(word for word in self.spec.design.words if word.name not in FIXED)
 
     @property

@@ -165,8 +165,8 @@ class RegisterMap:
     Attributes:
         spec, capture_registers: as given.
         capture: the design of the capture memory, or None.
-        status, pulses, words, active, live: the registers of those kinds in the order of the hardware's ports;
-            `pulses` begins with `commit`, whose address is the highest.
+        status, pulses, words, active, live: the registers of these kinds in the order of the hardware's ports; `pulses`
+            begins with `commit`, at the highest address.
         registers: every register, in the order of addresses.
         identity: the hash of the build, 16 hexadecimal digits.
         compressed: the map that the device carries, of all but the constants: zlib, JSON.

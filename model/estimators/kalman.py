@@ -88,7 +88,7 @@ ERROR_NORM = 18.0
 HEADROOM_BITS = 2
 """Gains of position and velocity may be raised to at most 2**HEADROOM_BITS times the designed ones at run time."""
 RATIOS = tuple(2 ** (step / 64) for step in range(32, -1, -1))
-"""The first of these factors that is stable lowers those gains and raises the gain of the acceleration."""
+"""The first stable one of these factors lowers those gains and raises the gain of the acceleration."""
 STABLE = 0.75
 """Largest part of 2 K_x K_v that K_a (2 - K_x) may be, where 1 is the limit of stability."""
 STEPS = 12

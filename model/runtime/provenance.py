@@ -78,7 +78,7 @@ def project_key() -> str:
 
 @functools.cache
 def imported(content: bytes, package: str) -> tuple[str, ...]:
-    """Return the names of all modules that a source imports, of their packages, and of what it takes from them."""
+    """Return the names of all modules that a source imports, of their packages, and of the names imported from them."""
     found = []
     for node in ast.walk(ast.parse(content)):
         if isinstance(node, ast.Import):

@@ -18,15 +18,14 @@ class Part:
         placed: the options that name the file of pins and the output.
         pack, unpack: the tools that make a bitstream, and read it back.
         suffixes: the ends of the names of its files.
-        code: what a bitstream says of the part that it is for.
+        code: the name of its part in a bitstream.
         oscillator: Verilog that drives the wire `oscillator` from the part's internal oscillator.
         pll: the part's PLL.
         counted: for every resource, the names in nextpnr's report that share its places; the first name is a place's.
         flip_flops: the beginning of the names of flip-flop cells.
         cells: for a netlist that is not placed, the number of units of every resource in a cell of each type.
         multiplier_ns: longest delay through a multiplier block without registers, if nextpnr does not know it.
-        untimed: types of cells whose delays are not known: paths that begin or end in one, or go through it, are not
-            in fmax.
+        untimed: types of cells with unknown delays: fmax leaves out paths that begin or end in one, or go through it.
     """
 
     synth: str
@@ -47,7 +46,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Suffixes:
-    """The ends of the names of a part's files: of pins, of what nextpnr writes, of bitstreams, of what is read back."""
+    """The suffixes of a part's files: pins, output of nextpnr, bitstream, readback."""
 
     pins: str
     routed: str

@@ -1,4 +1,4 @@
-"""The PLLs of the parts: which clocks they make from a board's oscillator, and the Verilog that makes one.
+"""The PLLs of the parts: the clocks that they make from a board's oscillator, and their Verilog.
 
 A clock is made exactly or not at all: every gain of an axis has its frequency in it. The ranges come from the vendors'
 data sheets, cited in `docs/reference/boards.md`. Among several ways to make a clock, the fastest phase detector is
@@ -40,7 +40,7 @@ class Setting(NamedTuple):
         clock: the clock that is made.
         compared: the frequency at the phase detector.
         vco: the frequency of the PLL's own oscillator.
-        dividers: the dividers by which it is made, by the names that `Pll` gives them.
+        dividers: the dividers that make it, by their names in `Pll`.
     """
 
     clock: Fraction

@@ -33,7 +33,7 @@ CLOCK_HZ = 50_000_000
 CLOCKS = 50
 DELAY_MAX_S = 0.1
 SCENE = "mhz"
-"""The scene whose device is measured, and whose encoder is given errors."""
+"""The scene with the measured device; its encoder is given errors."""
 FASTEST = {"controller.speed_max_m_per_s": 0.4}
 """The speed up to which the errors of an encoder must leave edges their order: more than the paper's signal has."""
 PHASE = "encoder.phase_error_counts"
@@ -248,7 +248,7 @@ def measure_recording(recorded: Recording, estimator: str, output: str, backend:
         estimator, output, backend: as for `measure`.
 
     Raises:
-        ReplayError: in one line, what is refused and what is accepted.
+        ReplayError: in one line: the fault, and the accepted values.
         RuntimeError: if the RTL could not be built.
     """
     check_length(recorded)

@@ -2,9 +2,9 @@
 
 The prior: the jerk is white noise of density S, and every edge is displaced by its own Gaussian error. This is linear
 and Gaussian. So the bound is the covariance of the Kalman filter that knows S and the error, at the edges' own times.
-No causal estimate has a smaller mean square error over the motions of the prior. S is the one that makes the edges of
-the motion in question most likely. One smooth motion may be read more accurately than the mean motion of the prior, and
-a motion that has impacts has no one density: the bound is a measure, not a wall.
+No causal estimate has a smaller mean square error over the motions of the prior. S makes the edges of the given motion
+most likely. One smooth motion may be read more accurately than the mean motion of the prior, and a motion that has
+impacts has no one density: the bound is a measure, not a wall.
 """
 
 import math

@@ -1,8 +1,8 @@
 """Training passes of an encoder, and the map of its scale that they give: swings by hand, seen by their edges alone.
 
 A pass is a swing from the middle of the scale. The encoder's seed and the number of the pass determine amplitude,
-decay, frequency and direction. The jitter is drawn anew for each pass. All that is taken of it are the edges that the
-axis decodes, with their stamps; the count is referenced at the start, as by homing.
+decay, frequency and direction. The jitter is drawn anew for each pass. Only the axis's decoded edges with their stamps
+are used. The count is referenced at the start, as by homing.
 """
 
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""A handle that is moved along a known path, whatever pushes it, and the force with which the wall of a scene answers.
+"""A handle on a prescribed path, whatever pushes it, and the force of a scene's wall on it.
 
 Six things are as in the closed loop: the encoder's edges, the decoder's time, the clocks up to the changed drive, the
 hold, an amplifier's delay and a converter's steps. What is behind them is left out: an amplifier's lag, a motor, a
@@ -20,7 +20,7 @@ from .playback import take
 
 
 class MotionError(ValueError):
-    """A handle cannot be moved so: one line that says how, and what is accepted."""
+    """A handle cannot be moved like this; the message is one line with the accepted values."""
 
 
 def check(moved: str, *quantities: tuple[str, float, float, float, str]) -> None:

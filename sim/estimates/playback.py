@@ -2,7 +2,7 @@
 
 The edges are placed so that the count at the strobe of sample k is exactly the count of the position at time k /
 sample_hz. The decoder's latency is left out, because it is the same for every estimator. A stamp is the clock in which
-its edge was decoded. The pins have no glitches but those that are asked for, and `accuracy.axis_spec` has no filter.
+its edge was decoded. The pins have no glitches except wanted ones, and `accuracy.axis_spec` has no filter.
 """
 
 from collections.abc import Iterator

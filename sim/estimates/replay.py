@@ -171,7 +171,7 @@ def replay(
         settings: gains and bounds that do not follow from C.
 
     Raises:
-        ReplayError: in one line, what is refused and what is accepted.
+        ReplayError: in one line: the fault, and the accepted values.
         RuntimeError: if the RTL could not be built.
     """
     output = check_names(estimator, output, backend)

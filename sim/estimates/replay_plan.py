@@ -157,7 +157,7 @@ def plan(
     """Return the plan of a replay; arguments as of `replay`.
 
     Raises:
-        ReplayError: in one line, what is refused and what is accepted.
+        ReplayError: in one line: the fault, and the accepted values.
     """
     rate, given = recording.rate_hz, acceleration_max_counts_per_s2
     time = RecordTime(rate)

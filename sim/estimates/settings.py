@@ -44,7 +44,7 @@ BOUNDS = {
 
 
 class SettingError(ValueError):
-    """A setting that is refused: one line with its key, and what is accepted."""
+    """A setting is refused; the message is one line with its key and the accepted values."""
 
 
 def settings_of(changes: Mapping[str, Any], estimator: str) -> Settings:

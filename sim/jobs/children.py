@@ -4,8 +4,8 @@ The children are in a process group led by a guard: a shell that waits for the e
 system closes the pipe when this process ends, even by SIGKILL, and the guard kills the group, with itself. Since a
 group contains the children of its members, all that a build starts ends with it.
 
-This holds on every POSIX system, for processes that stay in their group. The one thing that cannot be survived is
-SIGKILL of a guard together with this process.
+This holds on every POSIX system, for processes that stay in their group. The only exception is a SIGKILL of a guard
+together with this process.
 """
 
 import os
@@ -21,7 +21,7 @@ from ...model.runtime.termination import undone
 GUARD = ("/bin/sh", "-c", "trap '' HUP INT TERM; read line; kill -KILL 0")
 
 _living: dict["Group", int] = {}
-"""The groups that there are, and the identity of the thread that began each."""
+"""The existing groups, each with the identity of the thread that began it."""
 
 
 class Group:

@@ -36,7 +36,7 @@ SILENT = ("asyncio", "distributed", "tornado")
 
 
 class AddressError(ValueError):
-    """A text that cannot be the address of a scheduler; the message says what can."""
+    """A text cannot be the address of a scheduler; the message says what is accepted."""
 
 
 def check_address(text: str) -> None:

@@ -1,4 +1,4 @@
-"""Folders that a user names: written whole or not at all, and never over what somebody else has put there.
+"""Folders named by a user: written completely or not at all, and never over another's files.
 
 A folder of this module has the list of `whole_folder.py`, which identifies it. It may be replaced while it has no other
 files, and the listed files are unchanged.
@@ -36,7 +36,7 @@ def foreign(folder: Path) -> str | None:
 
 
 def write_folder(folder: Path, make: Callable[[Path], None]) -> None:
-    """Put a folder with the content that `make` gives it in the place of a folder that may be replaced.
+    """Replace a folder by a new one with the content from `make`, if it may be replaced.
 
     It is made beside its place. A link to a folder stays one.
 

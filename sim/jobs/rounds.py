@@ -1,6 +1,6 @@
 """Timing of contestants side by side, in rounds, with the median of each.
 
-In every round each contestant runs once, so that a machine that slows down slows them all.
+In every round each contestant runs once, so a machine that slows down slows all of them.
 """
 
 import statistics

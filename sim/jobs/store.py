@@ -6,8 +6,8 @@ change begins a new store. The line break comes before the text of a line. So a 
 was killed while it wrote, spoils no other line. A line that does not fit its digest is skipped, and its result computed
 again.
 
-The digest says what this process runs only while its sources are what they were when it began. If one is written
-meanwhile, nothing is taken from a store any more, nothing is kept, and a warning says so.
+The digest is valid only while the sources are unchanged since the process began. If one is written meanwhile, nothing
+is taken from a store any more, nothing is kept, and a warning says so.
 """
 
 import errno

@@ -108,7 +108,7 @@ def sweep(constants, world, controller, state, progress, memory, first, until):
         world, memory: as in `loop`.
         controller, state: `stamped.Controller` and `stamped.State`.
         progress: the `Progress` right after the change of the drive: `sample` is the sample that it comes from. The
-            progress that is returned is such a one, too; nobody asks what was `taken`.
+            returned progress is such a one, too; its `taken` is not used.
         first: number of the sample whose place in the arrays is the first.
         until: number of the first sample not to take.
     """

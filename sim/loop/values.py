@@ -1,7 +1,6 @@
 """The values that a run of the closed loop takes, writes to and returns.
 
-A part that a scene lacks (`converter`, `sweep`, `delay`, `waiting`, what is kept) is None, and then has no machine
-code.
+A missing part of a scene (`converter`, `sweep`, `delay`, `waiting`, kept samples) is None, and has no machine code.
 """
 
 from typing import NamedTuple

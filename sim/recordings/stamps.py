@@ -24,7 +24,7 @@ UNITS = {"s": 0, "ms": -3, "us": -6, "ns": -9}
 TIME_MAX_S, TIME_MAX = 1e12, 9e18
 """The largest time stamp, either way: tens of thousands of years, and what int64 has, which is less in nanoseconds."""
 DIGITS_MAX, DIGITS_OF_FLOAT = 19, 17
-"""The most digits of a whole number in int64, and those that tell every float64 apart."""
+"""The most digits of a whole number in int64, and the digits that distinguish every float64."""
 LEAST_POWER = -400
 """The least power of ten of a time: what is smaller is 0, as in float64."""
 

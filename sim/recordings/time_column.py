@@ -1,4 +1,4 @@
-"""Which column of a file tells of time, and in which unit.
+"""The column of a file with the times, and its unit.
 
 The column is `--time`, or `NAME.time` for counts in a column `NAME`, or `time_s`. Else it is the first one with one of
 these names: `t`, `time`, `timestamp`, `stamp`, `clock` and `elapsed`, with or without a unit at the end; or a unit
@@ -92,7 +92,7 @@ def time_column_of(table: Table, reading: Reading, other_than: set[int]) -> Time
 
 
 def unit_by_rate(where: str, mean: float) -> str:
-    """Return the unit of numbers that are so far apart, by the rates that it makes.
+    """Return the unit of times with this spacing, by the rate that it would give.
 
     Args:
         where: the file and the column, for a message.

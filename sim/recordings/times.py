@@ -15,9 +15,9 @@ half an interval on either side: it shows where the interval is 2 units or more.
 is given, all intervals must be printed alike.
 
 Whole numbers that are 1 or more apart in a column `time_s` may be seconds, or milliseconds, microseconds or
-nanoseconds: a rate or `--time-unit` must be given with them. A rate that is given with a column of another name, which
-was not asked for, must be its mean rate, within `MEAN`. The rate of floating-point times is the roundest number within
-their resolution.
+nanoseconds: a rate or `--time-unit` must be given with them. If a rate is given beside a column of times that nobody
+asked for, the rate must be the column's mean rate, within `MEAN`. The rate of floating-point times is the roundest
+number within their resolution.
 """
 
 from collections.abc import Sequence
@@ -125,7 +125,7 @@ class Sampled:
             )
 
     def _twice(self) -> str:
-        """Return what helps against a time that is there twice."""
+        """Return the remedy for a repeated time."""
         zero = bool((self._steps == 0).any())
         return ", or take repeated samples out (--gaps hold)" if zero else ""
 

@@ -1,7 +1,7 @@
 """The steps from Verilog to a bitstream: Yosys, nextpnr, and the packer of the part.
 
 A netlist is found by the content of the Verilog, and a placed and routed netlist by that content and its seed. Both are
-folders that are made whole and checked before they are used; the bitstream is packed from what the second has.
+folders, made completely and checked before use. The bitstream is packed from the second one.
 """
 
 import hashlib
@@ -159,7 +159,7 @@ def synthesised(board: Description, spec: AxisSpec | AxesSpec) -> Design:
 
 
 def place_and_route(design: Design, seed: int) -> Path:
-    """Return the folder of what nextpnr makes of a netlist with a seed; run it first if that is missing.
+    """Return the folder with nextpnr's result for a netlist and a seed; run nextpnr first if it is missing.
 
     Raises:
         DoesNotFitError: if the part has too few cells.

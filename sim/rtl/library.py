@@ -28,7 +28,7 @@ def shown_by(spec: AxisSpec) -> tuple[str, ...]:
 
 
 def resting_of(spec: AxisSpec) -> Resting:
-    """Return what may run in an axis while all else rests, and how to tell that it does.
+    """Return the counters that may run in an axis while the rest rests, and the test for this rest.
 
     Raises:
         RestsNotError: if none of its clocks may be skipped.
@@ -130,7 +130,7 @@ def build(spec: AxisSpec, traced: bool = False, short: bool = False) -> Path:
 
     Args:
         spec: the axis.
-        traced: include the code that records waveforms, of every clock, which is slower.
+        traced: include the code that records waveforms of every clock; it is slower.
         short: build quickly, for a run so short that building takes most of the time.
 
     Raises:

@@ -15,11 +15,11 @@ Its own next value is, behind such decisions again, its successor, itself, or wh
 
 **Why that is enough.** Let the inputs be constant. Let two clocks in a row leave every register and memory as it was,
 except the counters, which are one further after each clock. Let no counter be at a stop before, between or after the
-two clocks. All that decides then depends on what has not changed, so in both clocks every register takes its value by
-the same way. It cannot be the way from a counter: the counter's lowest bit differs in the two clocks, and the register
-would, too. So what a register takes is made of what has not changed. And a counter takes its successor: by any other
-way it would not be one further after each clock. Then the third clock begins like the second, except for the counters,
-so it takes the same paths. So does every clock up to one with a counter at a stop, or with other inputs.
+two clocks. Every decision then depends on unchanged values. So in both clocks every register takes its value by the
+same way. It cannot be the way from a counter: the counter's lowest bit differs in the two clocks, and the register
+would, too. So a register's new value is made of unchanged values. And a counter takes its successor: by any other way
+it would not be one further after each clock. Then the third clock begins like the second, except for the counters, so
+it takes the same paths. So does every clock up to one with a counter at a stop, or with other inputs.
 
 **When one clock is enough.** One clock is enough instead of two under two conditions. No register that leads to the
 shown outputs takes a counter by any way. And a counter's own next value is its successor, itself or a constant. If such
@@ -39,7 +39,7 @@ from dataclasses import dataclass
 from amaranth.hdl import _nir as nir
 
 COUNTERS = ("divider", "decoder.seen__stamp")
-"""The registers that may run: what tells an axis when to sample, and the number of the clock."""
+"""The registers that may run: the timer of an axis's samples, and the number of the clock."""
 
 
 class RestsNotError(ValueError):
@@ -67,7 +67,7 @@ class Resting:
 
     Attributes:
         counters: what may run while all else rests.
-        clocks: the clocks in a row in which nothing but the counters may change, to tell that it rests.
+        clocks: the number of successive clocks in which only the counters may change; the component then rests.
     """
 
     counters: tuple[Counter, ...]
@@ -75,12 +75,12 @@ class Resting:
 
 
 def check(netlist: nir.Netlist, shown: Iterable[str], listed: Iterable[str] = COUNTERS) -> Resting:
-    """Return the counters of a component that may run while all else rests, and how to tell that it does.
+    """Return the counters of a component that may run while the rest rests, and the test for this rest.
 
     Args:
         netlist: the component, from `hdl.export.to_netlist`.
         shown: the outputs that are looked at while clocks are skipped.
-        listed: names of the counters; those that it does not have are left out.
+        listed: names of the counters; missing ones are left out.
 
     Raises:
         RestsNotError: if a counter reaches what it must not.

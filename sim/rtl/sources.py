@@ -21,7 +21,7 @@ WAIVERS = Path(__file__).with_name("lint.vlt")
 VERILOG = {".v", ".sv"}
 """How the names of Verilog end, in small letters."""
 LONGEST = 1000
-"""The most letters of a file that are read to know what it is."""
+"""The most characters of a file that are read to identify it."""
 
 
 class OtherTopError(InputError):

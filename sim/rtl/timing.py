@@ -1,4 +1,4 @@
-"""Speed and size of what nextpnr has placed and routed, with the delay that it does not know.
+"""Speed and size of a placed and routed design, with the delay that nextpnr does not know.
 
 It times the iCE40's multiplier block as if it had registers. A block used without them is part of a path: from the last
 register before it, through it, to the first behind it.

@@ -83,7 +83,7 @@ def _converter(scene: Scene) -> Converter | None:
 
 
 def output_step_n(scene: Scene) -> float:
-    """Return the change of a command (N) that surely changes the output; 0 without a section that has steps."""
+    """Return the change of a command (N) that surely changes the output; 0 without steps in the output."""
     output = scene.output
     if scene.drive is not None:
         return scene.spec.drive.step_n

@@ -1,4 +1,4 @@
-"""The section `drive` of a scene: which drive stage its board has, and what makes newtons of its output."""
+"""The section `drive` of a scene: the drive stage of its board, and the amplifier that makes newtons of its output."""
 
 from typing import Annotated, Literal
 

@@ -10,7 +10,7 @@ from .section import Section
 HANDS: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name("hands.toml").read_text("utf-8"))
 """The published hands by name: the keys `OF_A_HAND`, and `grip`, `source` and `seen`, whether it was read there."""
 OF_A_HAND = "mass_kg", "damping_n_s_per_m", "stiffness_n_per_m"
-"""The keys that make a hand, which a published one has already."""
+"""The keys that describe a hand; a published hand has them already."""
 
 
 class HandSection(Section):

@@ -1,6 +1,6 @@
 """Reading of scenes: a TOML file, with some of its keys changed, becomes a checked `Scene`.
 
-Every error is one line that names the file, the key and what is accepted.
+Every error is one line: the file, the key and the accepted values.
 """
 
 import tomllib
@@ -42,7 +42,7 @@ def load(scene: str, changes: dict[str, Any] | None = None) -> Scene:
         changes: values by dotted key, e.g. `{"handle.mass_kg": 0.5}`; a value of None takes the key out.
 
     Raises:
-        SceneError: if the scene is not valid; the message is one line on what is wrong, where, and what is accepted.
+        SceneError: if the scene is not valid; the message is one line: the fault, its place, and the accepted values.
     """
     return parse(scene, read(scene), changes)
 

@@ -1,6 +1,6 @@
-"""Scenes: TOML files that state what is modelled. A section or key that is absent is not modelled.
+"""Scenes: TOML files that describe the modelled device. A section or key that is absent is not modelled.
 
-Units are in the keys. Every error is one line that names the file, the key and what is accepted.
+Units are in the keys. Every error is one line: the file, the key and the accepted values.
 """
 
 import dataclasses
@@ -263,7 +263,7 @@ class Scene(Section):
     def parameters(self) -> dict[str, float]:
         """Run-time parameters in SI units, by word; the count is 0 at the start, so the wall is at -`start_m`.
 
-        The surface of a coupling is a tool that is at the start, too, and the wall is that tool's.
+        With a coupling, the tool is at the start, too, and the wall acts on the tool.
         """
         si = {
             "encoder_glitch_clocks": self.glitch_clocks,

@@ -4,6 +4,6 @@ from pydantic import BaseModel, ConfigDict
 
 
 class Section(BaseModel):
-    """A table of keys that are all known, of the types that are stated, and never change."""
+    """A table with known keys of stated types, which never changes."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)

@@ -40,7 +40,7 @@ def written(key: tuple[str | int, ...]) -> str:
 
 
 def stranger(key: tuple[str | int, ...]) -> str | None:
-    """Return the sentence that says that a key, by its parts, is none of a scene; None if it is one."""
+    """Return the sentence on an unknown key of a scene, by its parts; None for a known key."""
     section: type[BaseModel] | None = Scene
     for depth, part in enumerate(key):
         if isinstance(part, int):

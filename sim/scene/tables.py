@@ -1,4 +1,4 @@
-"""The tables `[[axis]]` of a scene: what they say of each axis over what the sections at the top say of all.
+"""The tables `[[axis]]` of a scene: the keys of each axis, which replace the keys of the common sections.
 
 [wall]
 stiffness_n_per_m = 10e3        # of every axis that has none of its own
@@ -146,7 +146,7 @@ def _take_out(table: Content, parts: list[str]) -> None:
 
 
 def _merged(content: Content, table: Content) -> Content:
-    """Return what is said of all axes, with what a table says of its own in its place."""
+    """Return the keys common to all axes, with a table's own keys in their places."""
     result = copy.deepcopy(content)
     for key, value in table.items():
         both = isinstance(value, dict) and isinstance(result.get(key), dict)
@@ -155,7 +155,7 @@ def _merged(content: Content, table: Content) -> Content:
 
 
 def _with_the_axis(message: str, scene: str, name: str, content: Content, table: Content) -> str:
-    """Return a message that names the axis, unless it is about a key that is said of all axes."""
+    """Return a message that names the axis, unless it is about a key common to all axes."""
     said = message.removeprefix(f"{scene}: ")
     parts = re.match(r"[\w.]*", said)[0].split(".")
     of_all = _within(content, parts) and not _within(table, parts)

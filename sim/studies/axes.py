@@ -65,7 +65,7 @@ def cost(estimator: str, axes: int, supervised: bool, seeds: Iterable[int]) -> d
     """Return size and speed of axes that sample as fast as their rota allows, placed and routed alone.
 
     Returns:
-        estimator, axes, supervised, device, clock_mhz: what was synthesised, and the clock that was asked for.
+        estimator, axes, supervised, device, clock_mhz: the synthesised design, and the requested clock.
         lut4, ff, dsp, bram, available, untimed, latency_clocks, seeds, fmax_mhz_seeds, fmax_mhz: see
             `pipeline.synthesise_axes`.
         interval_clocks: the fewest clocks of a rota; max_sample_hz: the rate of each axis that follows at fmax_mhz.

@@ -69,7 +69,7 @@ class Choice:
         ]
 
     def notes(self) -> list[str]:
-        """Return the meaning of a star, and what is wrong with each encoder that has errors."""
+        """Return the meaning of a star, and the errors of each bad encoder."""
         encoders = {name: situation.get("encoder", {}) for name, situation in self.situations.items()}
         return ["*: the least error", *(f"{name}: {said_of(keys)}" for name, keys in encoders.items() if keys)]
 

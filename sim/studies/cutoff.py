@@ -64,7 +64,7 @@ class Optimum:
 
     @cached_property
     def level_hz(self) -> tuple[float, float]:
-        """The range of cutoffs around the best that are equally good, limited to the cutoffs that were mapped.
+        """The range of equally good cutoffs around the best, limited to the mapped cutoffs.
 
         Between two maps the area is interpolated linearly over the logarithm of the cutoff. Where the starts do not
         tell a cutoff from the best, the range goes on to it.

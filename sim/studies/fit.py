@@ -36,7 +36,7 @@ READINGS = {"3-30": (3.0, 30.0), "30-300": (30.0, 300.0)}
 """The readings of the paper's B axis: its first and its last damping, N s/m."""
 STIFFNESS_AXIS_N_PER_M = 60e3
 BEYOND = 1.3
-"""The factor by which maps extend beyond the axes, so that the end of a region is seen."""
+"""The factor by which maps extend beyond the paper's axes, so that the end of a region is visible."""
 COARSE, FULL = 12, 54
 """The numbers of steps of B in a map."""
 STIFFNESS_STEP_N_PER_M = 1e3

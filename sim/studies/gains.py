@@ -82,7 +82,7 @@ class Search:
         return np.array([[_area(a_map, in_place) if a_map else np.nan for a_map in row] for row in rows])
 
     def at_edge(self, gains: Gains) -> bool:
-        """Return whether gains are at the edge of the range that was tried, so that better gains may lie beyond."""
+        """Return whether gains are at the edge of the tried range: better gains may lie beyond."""
         ends = (self.lambdas[[0, -1]], gains.lambda_sqrt_m_per_s), (self.alphas[[0, -1]], gains.alpha_m_per_s2)
         return any(value in pair for pair, value in ends)
 
@@ -134,7 +134,7 @@ class Search:
         return [table_of(("output", "gains"), numbers, rows)]
 
     def notes(self) -> list[str]:
-        """Return which gains are at the edge of the range that was tried, and the meaning of a +."""
+        """Return the gains at the edge of the tried range, and the meaning of a +."""
         return [
             f"{output}, {name}: at the edge of what was tried; better gains may lie beyond"
             for output, name, pick in self._picks()

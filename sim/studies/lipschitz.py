@@ -79,7 +79,7 @@ class Lipschitz(Summary):
         }
 
     def notes(self) -> list[str]:
-        """Return what the record lacks of what was asked for."""
+        """Return the part of the requested record that is missing."""
         return self.cut
 
 

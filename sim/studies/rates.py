@@ -117,7 +117,7 @@ class Rates:
     effort: Effort
 
     def report(self) -> dict[str, Any]:
-        """Return what the command line prints, units in the keys; a limit that is not found is None."""
+        """Return the report for the command line, with units in the keys; a limit that is not found is None."""
         methods = [each.report() for each in self.gains]
         limits = {parts: [k if isfinite(k) else None for k in limit] for parts, limit in self.limits.items()}
         return self.effort._asdict() | {"methods": methods, "linear_limits": limits}

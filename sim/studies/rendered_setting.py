@@ -16,7 +16,7 @@ from ..walls.methods import Curve
 WITHIN = 0.1
 """The part of the commanded value by which a rendered one may be off and count as rendered."""
 SLOW_HZ = 10.0
-"""About how fast a hand shakes: the frequency at which the damping that the spring takes is measured."""
+"""The frequency at which the damping lost to the spring is measured: about the rate of a shaking hand."""
 
 
 class Spread(NamedTuple):
@@ -118,7 +118,7 @@ class Setting:
         return spread([-spring / gain for spring, gain in zip(alone, gains, strict=True)])
 
     def _renders_to_hz(self, commanded: float, rendered: Callable[[int], Spread]) -> int | None:
-        """Return the highest frequency up to which all starts render what is commanded; None if at none."""
+        """Return the highest frequency up to which all starts render the commanded wall; None if there is none."""
         highest = None
         for frequency_hz in self.waves:
             ends = rendered(frequency_hz)

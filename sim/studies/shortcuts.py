@@ -1,4 +1,4 @@
-"""Shortcuts that make a simulation cheaper, grouped by what they leave out, and their changes of a scene.
+"""Shortcuts that make a simulation cheaper, grouped by the omitted effect, and their changes of a scene.
 
 Every axis of shortcuts begins with its boldest; the boldest are also combined in pairs. Parts that a scene lacks are
 the opposite: they show the error of a description that leaves them out. Two more changes, `scatter`, are too slight to

@@ -52,7 +52,7 @@ FIGURE_5 = (
     *("zwidth", "seed-2011", "--starts", "1", "--set", "protocol.verdict=literal"),
     *("--set", "zwidth.damping_step_n_s_per_m=42.0", "--json"),
 )
-"""The paper's own Figure 5, coarse in B: hits whose length is bounded, so that it can be waited for on the RTL, too."""
+"""The paper's own Figure 5, coarse in B: hits of bounded length, short enough for the RTL, too."""
 COMMANDS = {
     "float (samples/s)": Command(("hit", SCENE, "--backend", "float", "--json"), 5, speed=True),
     "fixed (samples/s)": Command(("hit", SCENE, "--json"), 5, speed=True),

@@ -99,7 +99,7 @@ class _Column:
         self._verdicts: dict[int, dict[int, str]] = {}
 
     def _share(self, row: int, starts: list[int]) -> Generator:
-        """Have a wall hit by starts that have not yet; return the share of all that are stable."""
+        """Hit a wall from the remaining starts; return the share of stable hits among all."""
         known = self._verdicts.setdefault(row, {})
         missing = [start for start in starts if start not in known]
         if missing:

@@ -36,7 +36,7 @@ SEED = 1
 
 @dataclass(frozen=True)
 class Chatter:
-    """The velocity that the force sees for a handle at rest: the ends of every cycle that was met.
+    """The velocity that the force takes for a handle at rest: the extremes of every cycle found.
 
     Attributes:
         least_m_per_s, most_m_per_s: shape (cycles,), one value for each preceding motion.

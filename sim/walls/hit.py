@@ -202,7 +202,7 @@ class Hit(Summary):
 _compiled: set[Any] = set()
 """The results of `_kinds` for the arguments of the loops compiled in this process."""
 _compiling = threading.Lock()
-"""Held by the thread that compiles: the others, whose loop may be the same, wait in silence."""
+"""Held by the compiling thread: the others may need the same loop, and wait in silence."""
 
 
 def _kinds(value: Any) -> Any:
@@ -281,7 +281,7 @@ class Loop:
         return frozenset(sample for first in firsts for sample in (first, first + period))
 
     def _rests(self, state, before: tuple[int, Any] | None) -> tuple[int, Any]:
-        """Judge a handle that rests if the loop is now what it was at the look before; return this look."""
+        """Judge a resting handle if the loop's state equals the last look's; return this look."""
         now = repetition.seen(state, self.at, self.memory, self.scene.spec.clocks_per_sample)
         if before and before[1] == now and self.tally.still_from < before[0]:
             self.tally.rest()

@@ -31,7 +31,7 @@ from .swings import Swings, swung
 from .window import Room, Window
 
 FALLING = 0.9
-"""An RMS that is less than this part of the one before is falling."""
+"""An RMS below this fraction of the one before is falling."""
 ENOUGH = 8
 """Fewest swings that are compared with others. A swing is as long as the threshold at least."""
 STABLE, UNSTABLE, UNDECIDED = "stable", "unstable", "undecided"
@@ -81,7 +81,7 @@ class Tally:
 
     @property
     def mean_m(self) -> float:
-        """The mean position of the window that was judged; of the literal protocol, that before the settling mark."""
+        """The mean position of the judged window; in the literal protocol, the mean before the settling mark."""
         return self._mark_m if self._literal or self._judged is None else self._judged.mean_m
 
     @property
@@ -96,7 +96,7 @@ class Tally:
 
     @property
     def window_end(self) -> int:
-        """Number of the sample at which the window ends that is under way."""
+        """Number of the sample at which the present window ends."""
         return self._window_from + self._window.samples
 
     @property
@@ -184,7 +184,7 @@ class Tally:
         return last is not None and before is not None and last.rms_m >= FALLING * before.rms_m
 
     def _verdict_of(self, still: Window) -> str:
-        """Return what is said of a wall whose handle does not oscillate: stable if the wall holds it.
+        """Return the verdict on a wall whose handle does not oscillate: stable if the wall holds it.
 
         A handle that nothing holds soon has a constant speed, and is on its line, too.
         """

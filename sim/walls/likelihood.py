@@ -90,7 +90,7 @@ class Column:
         return np.array(halves)[places.ravel()]
 
     def _half(self, stable: np.ndarray, tries: np.ndarray) -> float:
-        """Return the K at which the curve passes one half: 0 if it does so below the first wall that was hit."""
+        """Return the K at which the curve passes one half: 0 if this is below the first wall hit."""
         some = tries > 0
         if not some.any():
             return 0.0

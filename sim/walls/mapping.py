@@ -147,7 +147,7 @@ class _Mapping:
 
     @property
     def of_variants(self) -> bool:
-        """Whether it is of a case that has variants, whose hits other maps may have had."""
+        """Whether its case has variants; other maps may already have their hits."""
         return len(self._jobs) > 1
 
     def answer(self, place: tuple[str, int], result: dict) -> None:

@@ -1,4 +1,4 @@
-"""Whether a closed loop provably repeats: all that its future depends on is what it was before.
+"""Whether a closed loop provably repeats: everything that determines its future equals an earlier state.
 
 The loop is a function: plant, encoder, drives on their way and controller after a sample follow from those before it,
 and from nothing else. Time enters by differences alone. So a loop that is in one state twice goes through all states in
@@ -25,7 +25,8 @@ PERIOD = 2520
 
 
 def period_of(scene: Scene, world: World, state: Any) -> int | None:
-    """Return the number of samples after which a resting loop of a scene is as before; None if that cannot be seen."""
+    """Return the number of samples after which a resting loop of a scene is as before; None if this cannot be
+    determined."""
     pulse = getattr(world.plant, "pulse", None)
     own = state.controller if isinstance(state, CoupledState) else state
     if not isinstance(own, State) or scene.spec.design.estimator.uses_stamps() or (pulse and pulse.period):

@@ -62,7 +62,8 @@ def held(scene: Scene, frequency_hz: float) -> complex:
 
 
 def impedance_n_per_m(scene: Scene, frequency_hz: float, exact: bool = False) -> complex:
-    """Return what a scene's wall renders of itself to a handle that moves sinusoidally: K_r + j w B_r, N/m.
+    """Return the stiffness and damping that a scene's wall renders to a handle in sinusoidal motion: K_r + j w B_r,
+    N/m.
 
     The commanded K + j w B, its damper behind the estimator, and all of it late and held. Counts are as fine as can be.
 

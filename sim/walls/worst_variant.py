@@ -54,7 +54,7 @@ def cases_of(case: Case, hands: Sequence[str]) -> list[Case]:
 
 
 def of(walls: dict[str, Wall]) -> list[str]:
-    """Return the variants, by name, in which the fewest hits of a wall are stable: all that have as few."""
+    """Return the names of the variants with the fewest stable hits of a wall; several if they are equal."""
     least = min(wall.share for wall in walls.values())
     return [name for name, wall in walls.items() if wall.share == least]
 
@@ -83,7 +83,7 @@ def at_edge(variants: dict[str, tuple[Wall, ...]], point: BoundaryPoint) -> list
 
 
 def told(variants: dict[str, tuple[Wall, ...]], boundary: list[BoundaryPoint]) -> str:
-    """Return in words which variant is the worst at which B; nothing of a case without variants."""
+    """Return in words the worst variant at each B; empty for a case without variants."""
     if not variants:
         return ""
     stretches: list[tuple[str, list[float]]] = []

@@ -125,7 +125,7 @@ def fits(plant, terms, seconds, order, rub_rest, rests):
         plant, seconds, order: as in `expand`.
         terms: the plant's.
         rub_rest: the rest of v z / g.
-        rests: those that are assumed of v and z.
+        rests: the assumed ones of v and z.
     """
     v, z = rests
     rate = v + plant.stiffness_n_per_m * rub_rest

@@ -88,7 +88,7 @@ class Shunt:
 
     @property
     def states(self) -> int:
-        """Number of states that it adds: the command that the loop has reached, and the capacitor's voltage."""
+        """Number of states that it adds: the command reached by the loop, and the capacitor's voltage."""
         return 2 if self.capacitance_f else 1
 
     def amplified(self, motor: Motor) -> float:

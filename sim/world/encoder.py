@@ -155,9 +155,9 @@ def numbers_from(encoder, cell, positions):
 
 @compiled
 def number_at(encoder, positions):
-    """Return the numbers of the cells that hold an array of positions (m): the counts that an encoder has there.
+    """Return the numbers of the cells at an array of positions (m): an encoder's counts there.
 
-    With hysteresis the positions are met in this order, and the first cell is the one that would hold it without.
+    With hysteresis the positions are met in this order; the first cell is found without hysteresis.
     """
     return numbers_from(encoder, locate(encoder, positions[0] if len(positions) else 0.0), positions)
 
@@ -195,7 +195,7 @@ def _clamped(lines, clock, clocks):
 
 @compiled
 def stamp(encoder, cell, upwards, at_s, interval):
-    """Return the clock at which the pins show that a cell is left upwards or downwards, `at_s` into an interval.
+    """Return the clock at which the pins change as a cell is left upwards or downwards, `at_s` into an interval.
 
     It is within the interval, unless the encoder has lines, which show edges later: `lines.carry` puts them in order.
     """

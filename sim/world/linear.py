@@ -1,4 +1,4 @@
-"""Devices whose state has a rate of change that is linear in the state and the command, in each of nine phases.
+"""Devices with linear dynamics in the state and the command, in each of nine phases.
 
 A phase combines the handle (sliding up, sliding down or stuck) with the voltage (within its limits, or at one of them).
 `taylor` and `euler` both solve such a device from the same tables, and share the code of this file. An interval is one
@@ -15,7 +15,7 @@ from .converter import width_of
 
 PHASES = 9
 STATES = 5
-"""Number of states that the tables have room for; known when compiling, so that loops over them are unrolled."""
+"""Number of states in the tables; known when compiling, so that loops over them are unrolled."""
 SEEN, GRIP, VOLTAGE, QUANTITIES = 5, 6, 7, 8
 """The quantities after the state: the encoder's position, the one that decides on sticking, and the voltage; then the
 number of quantities."""

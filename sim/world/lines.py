@@ -27,7 +27,7 @@ JITTER, GAPS, CHANNELS = 2, 3, 4
 """The streams of random numbers: of the jitter, of the times between glitches, and of the lines that they are on."""
 A, B = 1, 2
 ROUNDING = 1e-6
-"""Clocks by which a product of a time and a clock may be above a whole number that it is meant to be."""
+"""The rounding error, in clocks, by which a product of a time and a clock may exceed its true whole number."""
 
 
 class Lines(NamedTuple):
@@ -178,7 +178,7 @@ def _show(lines, kept, n_edges, until, clock_hz):
 
 @compiled
 def carry(lines, kept, before, n_edges, interval, clock_hz):
-    """Turn the edges that the handle passed in an interval into what the pins show up to its end.
+    """Turn the edges passed in an interval into the changes of the pins up to its end.
 
     Args:
         lines: the `Lines`.

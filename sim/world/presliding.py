@@ -10,7 +10,7 @@ A leg has one direction of motion, and is one of two kinds.
   between the two speeds both motions are equal to rounding.
 
 Bristles never quite fill: the gap closes by 1 / e for each `full_m` that the handle slips. A gap within `FULL` of it is
-closed, which moves the friction by that part of Coulomb's level and no more.
+closed. This changes the friction by at most this fraction of Coulomb's level.
 
 A handle rests, and keeps its state bit for bit, only if its bristles bear the force exactly; else it swings on them.
 """
