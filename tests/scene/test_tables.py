@@ -150,7 +150,7 @@ def test_what_is_wrong_with_all_axes_names_none(text, said):
         (
             "axis.gripp.wall.damping_n_s_per_m",
             1.0,
-            "'axis.gripp.wall.damping_n_s_per_m' is of no axis of this scene: they",
+            "'axis.gripp.wall.damping_n_s_per_m' names no axis of this scene: its axes",
         ),
         ("axis", 1.0, "'axis' names no axis of this scene: its axes are base, shoulder"),
         ("axis.grip", 1.0, "'axis.grip' must be followed by a key of a scene"),

@@ -163,7 +163,7 @@ def test_report_and_table_and_what_is_known_is_not_hit_again(monkeypatch, capsys
         ),
         (
             ["--set", "zwidth.stiffness_step_n_per_m=123.0"],
-            "--set 'zwidth.stiffness_step_n_per_m' is what this command",
+            "--set 'zwidth.stiffness_step_n_per_m' must be absent (this command",
         ),
         (["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "give it or --workers, not both"),
     ],

@@ -139,7 +139,7 @@ def test_only_the_causes_that_a_tab_shows_are_acknowledged(driver, board):
     board.show(state=TRIPPED, latched=STOP | 1, first=STOP)
     wait_until(lambda: driver.view.status.trip)
     driver.acknowledge(STOP)
-    wait_until(lambda: "other causes stand" in driver.view.said)
+    wait_until(lambda: "the causes have changed since" in driver.view.said)
     assert driver.view.status.state is State.TRIPPED
     driver.acknowledge(STOP | 1)
     wait_until(lambda: driver.view.status.state is State.DISARMED)
