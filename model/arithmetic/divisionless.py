@@ -16,8 +16,8 @@ rounded to TABLE bits behind the first. 2 - s is rounded down to STEP bits and t
 
     0 < e <= (1 - s)**2 + s 2**-STEP + t 2**-FINE <= ERROR_MAX = 2**-(DIGIT + 1)       `reciprocal_error`
 
-R stays below 2. A digit has DIGIT + 1 bits, and its first bit carries into the digits before it. The next R is below 1
-+ 2**(DIGIT + 1) e <= 2. So R is below twice r t at the end, and q is one too small at most: q is exact.
+R stays below 2. A digit has DIGIT + 1 bits, and its first bit carries into earlier digits. So the next R is below 1 +
+2**(DIGIT + 1) e <= 2. So R is below twice r t at the end, and q is one too small at most: q is exact.
 
 Source: Newton's method for a reciprocal, and digits of a quotient by a reciprocal in a high base with what remains, are
 textbook arithmetic.

@@ -49,8 +49,8 @@ Formats, derived. C' = C tau^2 / q; 2**reach is at least 1/h and at least 1.
   gains of the designed h, or of any larger h that the words hold; with others the last bits may move.
 - int64 holds 62 bits: if the formats do not fit, f is reduced.
 
-Range of the gains. The poles are the roots of z^3 + (K_x + K_v + K_a/2 - 3) z^2 + (3 - 2 K_x - K_v + K_a/2) z + K_x -
-1. By Jury's criterion they are stable if and only if
+Range of the gains. The poles are roots of the polynomial z^3 + (K_x + K_v + K_a/2 - 3) z^2 + (3 - 2 K_x - K_v + K_a/2)
+z + K_x - 1. By Jury's criterion they are stable if and only if
 
     0 < K_x < 2,    0 < K_v,    0 < K_a,    2 K_x + K_v < 4,    K_a (2 - K_x) < 2 K_x K_v
 

@@ -6,9 +6,9 @@
   count, to 2**-SPEED_BITS, and at least the slowest edges. `acceleration` has the same width, so that one multiplier
   suffices for both, and its i holds 2**ACCELERATION_BITS C. Both have at most WIDTH_MAX bits, and no more than let
   their product with a time fit int64.
-- `mantissa`: number of top bits of a time that multiply and divide. A T cut to these bits has a relative error of 2**(1
-  - mantissa). This changes D/T, the speed of one count in it, by at most 4 LSB of velocity. Times of at least four
-  samples and four shortest intervals are exact.
+- `mantissa`: number of top bits of a time that multiply and divide. If T is cut to these bits, its relative error is
+  2**(1 - mantissa). This changes D/T, the speed of one count in it, by at most 4 LSB of velocity. Times of at least
+  four samples and four shortest intervals are exact.
 - `error`, E over 2**k if k bits are cut. i holds |v| 2**mantissa and the place from which it is subtracted. f is less
   than velocity's by the bits of the shortest interval less one: half an LSB of velocity after the division.
 - `place`: half a count, in steps of 2**-PLACE_BITS. `distance`: edges at twice the largest speed in two samples and two
