@@ -125,7 +125,9 @@ def test_rounded_stamps_are_no_gaps(read, refused, rate, rule):
         assert len(found.counts) == (590 if rule == "split" and len(kept) < 1000 else 1000)
         assert found.counts[-1] == 999
         if rate < 990:  # else a piece has too few to tell
-            assert re.search(r"give the rate \(--rate [5-9]\d\d(\.\d+)?\), because", refused(coarse(rate, kept), gaps=rule))
+            assert re.search(
+                r"give the rate \(--rate [5-9]\d\d(\.\d+)?\), because", refused(coarse(rate, kept), gaps=rule)
+            )
 
 
 @pytest.mark.parametrize("lost", [1, 20])
