@@ -32,23 +32,23 @@ FILE = re.compile(
 @study("workers", "plot", *READING, kind=ReadingOptions)
 def command(
     options: ReadingOptions,
-    figure: Annotated[int | None, typer.Option(min=1, max=2, help="reproduce the founding paper's figure")] = None,
+    figure: Annotated[int | None, typer.Option(min=1, max=2, help="reproduce this figure of the paper")] = None,
     signal: Annotated[
         list[str] | None,
         typer.Option(
-            help="paper, sweep, stop, flicker, hit, steady:MM_PER_S, FILE:COLUMN of a recording, or FILE of a capture",
+            help="paper, sweep, stop, flicker, hit or steady:MM_PER_S; or a recording, FILE:COLUMN; or a capture, FILE",
             show_default="paper",
         ),
     ] = None,
     wanted: EstimatorsOption = None,
-    rates: Annotated[str | None, typer.Option(metavar="HZ,...", help="sample rates, e.g. 1e3,10e3,1e6")] = None,
+    rates: Annotated[str | None, typer.Option(metavar="HZ,...", help="sample rates, 1e3 to 1e7 Hz each")] = None,
     backend: BackendOption = "float",
     encoder_phase_error: Annotated[
-        float, typer.Option(metavar="COUNTS", help="delay of channel B, -0.95 to 0.95 counts")
+        float, typer.Option(metavar="COUNTS", help="phase error of channel B, -0.95 to 0.95 counts")
     ] = 0.0,
     acceleration_max: Annotated[
         float | None,
-        typer.Option(metavar="C", help="acceleration that sets the gains, m/s^2", show_default="the signal's own"),
+        typer.Option(metavar="C", help="bound that sets the gains, 1e-9 to 1e6 m/s^2", show_default="the signal's own"),
     ] = None,
     assignments: EncoderSetOption = None,
 ) -> None:
@@ -59,7 +59,7 @@ def command(
     encoder = _encoder(assignments, encoder_phase_error)
     if not known and (rates is not None or encoder or acceleration_max is not None):
         raise BadInput(
-            "--rates, --encoder-phase-error and --acceleration-max are for known motions, as is --set: a recording has "
+            "--rates, --encoder-phase-error, --acceleration-max and --set are for known motions: a recording has "
             "its own"
         )
     if options.given and not recorded:
@@ -69,7 +69,9 @@ def command(
         within(acceleration_max, "--acceleration-max", *ACCELERATIONS_M_PER_S2, "m/s^2")
     at = figures.RATES_HZ[figure or 2] if rates is None else rates_of(rates, "--rates")
     if options.plot and (recorded or len(known) > 1):
-        raise BadInput("--plot draws error against rate for one signal that is no recording: give one --signal")
+        raise BadInput(
+            "--plot draws the error of one known motion against the rate: give one --signal, not a recording"
+        )
     if options.plot and figure == 1 and (len(at) > 1 or at[0] > DRAWN_HZ_MAX):
         raise BadInput(f"--figure 1 is drawn at one rate of at most {DRAWN_HZ_MAX:g} Hz, not {rates!r}")
     of_all: dict[str, Any] = {"backend": backend}
@@ -94,7 +96,7 @@ def _encoder(assignments: list[str] | None, phase_error_counts: float) -> dict[s
     """Return the errors of the encoder, as for `measure`."""
     encoder = encoder_of(assignments)
     if phase_error_counts and PHASE in encoder:
-        raise BadInput(f"--encoder-phase-error must be absent beside --set {PHASE}, which is the same")
+        raise BadInput(f"--encoder-phase-error must be absent beside --set {PHASE}: both set the same error")
     return encoder | ({PHASE: phase_error_counts} if phase_error_counts else {})
 
 
