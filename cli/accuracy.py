@@ -34,27 +34,27 @@ FILE = re.compile(
 @study("workers", "plot", *READING, kind=ReadingOptions)
 def command(
     options: ReadingOptions,
-    figure: Annotated[int | None, typer.Option(min=1, max=2, help="reproduce the founding paper's figure")] = None,
+    figure: Annotated[int | None, typer.Option(min=1, max=2, help="reproduce this figure of the paper")] = None,
     signal: Annotated[
         list[str] | None,
         typer.Option(
-            help="paper, sweep, stop, flicker, hit, steady:MM_PER_S, FILE:COLUMN of a recording, or FILE of a capture",
+            help="paper, sweep, stop, flicker, hit or steady:MM_PER_S; or a recording, FILE:COLUMN; or a capture, FILE",
             show_default="paper",
         ),
     ] = None,
     wanted: EstimatorsOption = None,
-    rates: Annotated[str | None, typer.Option(metavar="HZ,...", help="sample rates, e.g. 1e3,10e3,1e6")] = None,
+    rates: Annotated[str | None, typer.Option(metavar="HZ,...", help="sample rates, 1e3 to 1e7 Hz each")] = None,
     backend: BackendOption = "float",
     encoder_phase_error: Annotated[
-        float, typer.Option(metavar="COUNTS", help="delay of channel B, -0.95 to 0.95 counts")
+        float, typer.Option(metavar="COUNTS", help="phase error of channel B, -0.95 to 0.95 counts")
     ] = 0.0,
     acceleration_max: Annotated[
         float | None,
-        typer.Option(metavar="C", help="acceleration that sets the gains, m/s^2", show_default="the signal's own"),
+        typer.Option(metavar="C", help="bound that sets the gains, 1e-9 to 1e6 m/s^2", show_default="the signal's own"),
     ] = None,
     jerk_max: Annotated[
         float | None,
-        typer.Option(metavar="J", help="jerk that sets the gains, m/s^3", show_default="the paper's signal's"),
+        typer.Option(metavar="J", help="bound that sets the gains, 1e-9 to 1e12 m/s^3", show_default="the swing's"),
     ] = None,
     assignments: EncoderSetOption = None,
 ) -> None:
@@ -63,23 +63,20 @@ def command(
     curves = figures.curves(figure) if wanted is None and figure else curves_of(wanted)
     known, recorded = _signals(list(dict.fromkeys(signal or ["paper"])))
     encoder = _encoder(assignments, encoder_phase_error)
-    bounds = {"acceleration_max_m_per_s2": acceleration_max, "jerk_max_m_per_s3": jerk_max}
-    of_all = {"backend": backend} | {name: bound for name, bound in bounds.items() if bound is not None}
+    of_all = {"backend": backend, **_bounds(acceleration_max, jerk_max)}
     if not known and (rates is not None or encoder or len(of_all) > 1):
         raise BadInput(
-            "--rates, --encoder-phase-error, --acceleration-max and --jerk-max are for known motions, as is --set: a "
-            "recording has its own"
+            "--rates, --encoder-phase-error, --acceleration-max, --jerk-max and --set are for known motions: a recording "
+            "has its own"
         )
     if options.given and not recorded:
         hint = ": the rates of known motions are --rates" if options.rate is not None else ""
         raise BadInput(f"{', '.join(options.given)} must be absent without a recording{hint}")
-    if acceleration_max is not None:
-        within(acceleration_max, "--acceleration-max", *ACCELERATIONS_M_PER_S2, "m/s^2")
-    if jerk_max is not None:
-        within(jerk_max, "--jerk-max", *JERKS_M_PER_S3, "m/s^3")
     at = figures.RATES_HZ[figure or 2] if rates is None else rates_of(rates, "--rates")
     if options.plot and (recorded or len(known) > 1):
-        raise BadInput("--plot draws error against rate for one signal that is no recording: give one --signal")
+        raise BadInput(
+            "--plot draws the error of one known motion against the rate: give one --signal, not a recording"
+        )
     if options.plot and figure == 1 and (len(at) > 1 or at[0] > DRAWN_HZ_MAX):
         raise BadInput(f"--figure 1 is drawn at one rate of at most {DRAWN_HZ_MAX:g} Hz, not {rates!r}")
     if encoder:
@@ -97,11 +94,23 @@ def command(
     options.finish(result)
 
 
+def _bounds(acceleration_m_per_s2: float | None, jerk_m_per_s3: float | None) -> dict[str, float]:
+    """Return the bounds that are given, as for `measure`."""
+    given = {}
+    if acceleration_m_per_s2 is not None:
+        within(acceleration_m_per_s2, "--acceleration-max", *ACCELERATIONS_M_PER_S2, "m/s^2")
+        given["acceleration_max_m_per_s2"] = acceleration_m_per_s2
+    if jerk_m_per_s3 is not None:
+        within(jerk_m_per_s3, "--jerk-max", *JERKS_M_PER_S3, "m/s^3")
+        given["jerk_max_m_per_s3"] = jerk_m_per_s3
+    return given
+
+
 def _encoder(assignments: list[str] | None, phase_error_counts: float) -> dict[str, Any]:
     """Return the errors of the encoder, as for `measure`."""
     encoder = encoder_of(assignments)
     if phase_error_counts and PHASE in encoder:
-        raise BadInput(f"--encoder-phase-error must be absent beside --set {PHASE}, which is the same")
+        raise BadInput(f"--encoder-phase-error must be absent beside --set {PHASE}: both set the same error")
     return encoder | ({PHASE: phase_error_counts} if phase_error_counts else {})
 
 

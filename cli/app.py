@@ -1,8 +1,8 @@
 """The command line. Results go to stdout, everything else to stderr.
 
-The exit codes are 0, 1 for a failed run, 2 for bad input, 129 after SIGHUP, 130 after SIGINT, 143 after SIGTERM, and
-141 if stdout was closed early. This module imports nothing that comes with an extra, so that it can name an extra that
-is not installed, and nothing that takes long: until `main` hears signals, an interrupt is a traceback of Python.
+The exit codes are 0, 1 for a failed run, 2 for bad input, and 141 if stdout was closed early; 129 after SIGHUP, 130
+after SIGINT, 143 after SIGTERM. This module imports nothing from an extra, so it can name a missing extra. It imports
+nothing slow, because an interrupt gives a Python traceback until `main` handles signals.
 """
 
 import gc
@@ -15,8 +15,8 @@ from . import streams
 from .errors import BadInput, one_line
 
 COLLECTED = 100_000, 100, 100
-"""How seldom Python looks for garbage. Imports and the compiler make objects that stay: to go through all of them again
-and again, by Python's own numbers, is an eighth of the time in which a loop is compiled."""
+"""How seldom Python looks for garbage. Imports and the compiler make objects that stay. By Python's default thresholds,
+going through them again and again takes an eighth of the time in which a loop is compiled."""
 
 
 def main() -> None:

@@ -17,7 +17,8 @@ OPENED = "the loop of drive_enable opened, or another program disarmed it"
 def command(
     port: PortArgument,
     words: Annotated[
-        list[str] | None, typer.Argument(metavar="WORD=VALUE...", help="words in SI units, written before")
+        list[str] | None,
+        typer.Argument(metavar="WORD=VALUE...", help="words to write first, in SI units, e.g. wall_stiffness=2e3"),
     ] = None,
     baud: BaudOption = BAUD,
     identity: IdentityOption = None,

@@ -18,12 +18,12 @@ from .study import StudyOptions, study
 def command(
     options: StudyOptions,
     wanted: Annotated[
-        str, typer.Option("--estimators", metavar="NAME,...", help=f"estimators: {', '.join(PIPELINES)}")
+        str, typer.Option("--estimators", metavar="NAME,...", help=f"estimators to compare: {', '.join(PIPELINES)}")
     ] = "levant",
     numbers: Annotated[
         str, typer.Option("--axes", metavar="N,...", help=f"numbers of axes, 1 to {AXES_MAX}")
     ] = ",".join(map(str, axes.NUMBERS)),
-    bare: Annotated[bool, typer.Option("--bare", help="also the axes without supervisors")] = False,
+    bare: Annotated[bool, typer.Option("--bare", help="add the axes without supervisors")] = False,
     seeds: SeedsOption = 1,
 ) -> None:
     jobs = axes.jobs(_names(wanted), _numbers(numbers), bare, seeds)

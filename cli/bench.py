@@ -19,7 +19,10 @@ def command(
     scene: SceneArgument = "mhz",
     against: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="another checkout, set up, or environment: its commands are timed in turns"),
+        typer.Option(
+            metavar="DIR",
+            help="checkout (after `make tools`) or environment with another hardwall, timed in turns with this one",
+        ),
     ] = None,
 ) -> None:
     try:

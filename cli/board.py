@@ -30,15 +30,27 @@ def boards_beginning(incomplete: str) -> list[str]:
 @study("set_")
 def command(
     options: StudyOptions,
-    board: Annotated[str, typer.Argument(metavar="BOARD", help=", ".join(BOARDS), autocompletion=boards_beginning)],
+    board: Annotated[
+        str, typer.Argument(metavar="BOARD", help=f"the board: {', '.join(BOARDS)}", autocompletion=boards_beginning)
+    ],
     folder: Annotated[
-        str, typer.Option("-o", "--output-folder", metavar="DIR", help="folder for the files, new or written before")
+        str,
+        typer.Option(
+            "-o", "--output-folder", metavar="DIR", help="folder for the files: new, empty, or written by this command"
+        ),
     ],
     scene: SceneOfBoardArgument = None,
     estimator: EstimatorOption = None,
     axes: AxesOption = None,
-    seeds: Annotated[int, typer.Option(min=1, max=99, help="most placements until one reaches the clock")] = 5,
-    program: Annotated[Memory | None, typer.Option(help="put the bitstream into the board that is connected")] = None,
+    seeds: Annotated[
+        int,
+        typer.Option(
+            min=1, max=99, help="largest number of placements to try; the first that reaches the clock rate is taken"
+        ),
+    ] = 5,
+    program: Annotated[
+        Memory | None, typer.Option(help="load the bitstream into this memory of the connected board")
+    ] = None,
 ) -> None:
     on = board_named("board", board)
     if program and program not in on.loads:
@@ -64,7 +76,7 @@ def board_named(option: str, name: str) -> Description:
 
 
 def scene_on(board: Description, changes: dict[str, Any], scene: str | None) -> Scene:
-    """Return the scene that a board is to run: its own, at a clock that it makes, if none is given."""
+    """Return the scene for a board: the given one, or the board's own, at a clock that the board can make."""
     return load(scene, changes) if scene is not None else load(board.scene, board.changes | changes)
 
 

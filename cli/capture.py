@@ -22,7 +22,7 @@ from .terminal import log, progress
 
 DECIMATION_MAX = (1 << DECIMATION_BITS) - 1
 TRIGGER, HAND = "contact", "hand"
-"""The trigger unless another one is given; and that of a person, as soon as enough records are there before it."""
+"""The default trigger; and the trigger by hand, which comes as soon as enough records are there before it."""
 
 
 @dataclass(frozen=True)
@@ -56,32 +56,41 @@ def command(
     options: ReportOptions,
     port: PortArgument,
     words: Annotated[
-        list[str] | None, typer.Argument(metavar="WORD=VALUE...", help="words in SI units, written before")
+        list[str] | None,
+        typer.Argument(metavar="WORD=VALUE...", help="words to write first, in SI units, e.g. wall_stiffness=2e3"),
     ] = None,
     trigger: Annotated[
-        str, typer.Option(metavar="NAME,...", help=f"what triggers: {', '.join((*SOURCES, HAND))}")
+        str, typer.Option(metavar="NAME,...", help=f"triggers: {', '.join((*SOURCES, HAND))} (without an event)")
     ] = TRIGGER,
     before: Annotated[
         int | None,
-        typer.Option(min=0, max=RECORDS_MAX, help="records wanted before the trigger", show_default="a quarter of all"),
+        typer.Option(
+            min=0, max=RECORDS_MAX, help="number of records before the trigger", show_default="a quarter of all records"
+        ),
     ] = None,
-    decimation: Annotated[int, typer.Option(min=1, max=DECIMATION_MAX, help="samples from a record to the next")] = 1,
-    level: Annotated[float, typer.Option(metavar="M", help="the position of the triggers rise and fall, m")] = 0.0,
-    arm: Annotated[bool, typer.Option("--arm", help="arm the axis first, and disarm it at the end")] = False,
-    last: Annotated[bool, typer.Option("--last", help="read the capture that the board has, and begin none")] = False,
-    seconds: Annotated[float, typer.Option(metavar="S", help="the longest wait")] = 60.0,
+    decimation: Annotated[
+        int, typer.Option(min=1, max=DECIMATION_MAX, help="samples per record: 1 records every sample")
+    ] = 1,
+    level: Annotated[
+        float, typer.Option(metavar="M", help="position at which the triggers rise and fall act, m")
+    ] = 0.0,
+    arm: Annotated[bool, typer.Option("--arm", help="arm the axis first; disarm it at the end")] = False,
+    last: Annotated[
+        bool, typer.Option("--last", help="read the capture that the board already has, without starting one")
+    ] = False,
+    seconds: Annotated[float, typer.Option(metavar="S", help="longest wait for the trigger, 0 to 1e6 s")] = 60.0,
     baud: BaudOption = BAUD,
     identity: IdentityOption = None,
     pace: PaceOption = None,
-    out: Annotated[Path | None, typer.Option("-o", "--out", metavar="FILE.npz", help="file for the records")] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="FILE.npz", help="write the records into this .npz")
+    ] = None,
 ) -> None:
     within(seconds, "--seconds", 0.0, 1e6, "s")
     out = output_file(out, "--out", (".npz",))
     values, sources = values_of(words or []), _sources(trigger)
     if last and (words or arm or (trigger, before, decimation, level) != (TRIGGER, None, 1, 0.0)):
-        raise BadInput(
-            "--last reads what is there: it goes with no word, --arm, --trigger, --before, --decimation, --level"
-        )
+        raise BadInput("--last reads a finished capture: no word, --arm, --trigger, --before, --decimation or --level")
     with axis_at(port, baud, identity, pace) as axis:
         if values:
             axis.set(**values)

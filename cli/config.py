@@ -23,7 +23,7 @@ SUFFIX = ".toml"
 
 @dataclass(frozen=True)
 class Done:
-    """What was done with a file.
+    """The result of a command on a file.
 
     Attributes:
         act: what was asked for.
@@ -61,13 +61,21 @@ class Done:
 @reports()
 def command(
     options: ReportOptions,
-    act: Annotated[Act, typer.Argument(metavar="save|load|diff", help="from the board, to it, or compare")],
+    act: Annotated[
+        Act,
+        typer.Argument(
+            metavar="save|load|diff",
+            help="save from the board to the file, load from the file into the board, or show the differences",
+        ),
+    ],
     port: PortArgument,
-    saved: Annotated[Path, typer.Argument(metavar="FILE.toml", help="the words in SI units, and the board's identity")],
+    saved: Annotated[
+        Path, typer.Argument(metavar="FILE.toml", help="file with the words in SI units and the board's identity")
+    ],
     baud: BaudOption = BAUD,
     identity: IdentityOption = None,
     pace: PaceOption = None,
-    yes: Annotated[bool, typer.Option("--yes", help="load what differs without a question")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="load without asking; needed outside a terminal")] = False,
 ) -> None:
     asked = act == "load" and not yes
     if yes and act != "load":

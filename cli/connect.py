@@ -18,7 +18,7 @@ KINDS = tuple(kind for kind in Kind if kind not in (Kind.PULSE, Kind.CONSTANT))
 
 @dataclass(frozen=True)
 class Board:
-    """What a board says of itself.
+    """A board's description of itself.
 
     Attributes:
         summary: values, by key.
@@ -50,7 +50,9 @@ def command(
     baud: BaudOption = BAUD,
     identity: IdentityOption = None,
     pace: PaceOption = None,
-    registers: Annotated[bool, typer.Option("--registers", help="every register, too")] = False,
+    registers: Annotated[
+        bool, typer.Option("--registers", help="list every register, with its value, unit and range")
+    ] = False,
 ) -> None:
     with axis_at(port, baud, identity, pace) as axis:
         summary = _summary(port, axis)

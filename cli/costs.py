@@ -16,9 +16,7 @@ from .study import StudyOptions, study
 def command(
     options: StudyOptions,
     wanted: EstimatorsOption = None,
-    device: Annotated[
-        PartName | None, typer.Option(help="the part to place and route for", show_default="each")
-    ] = None,
+    device: Annotated[PartName | None, typer.Option(help="FPGA to place and route for", show_default="each")] = None,
     seeds: SeedsOption = 3,
 ) -> None:
     names = list(dict.fromkeys(curve.estimator for curve in curves_of(wanted)))

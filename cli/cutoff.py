@@ -20,13 +20,15 @@ def command(
     scenes: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="SCENE...", help=f"some of {', '.join(names())}, or .toml files", show_default="three devices"
+            metavar="SCENE...",
+            help=f"scenes: {', '.join(names())}, or .toml files",
+            show_default=", ".join(cutoff.SCENES),
         ),
     ] = None,
     starts: StartsOption = STARTS,
     backend: ModelOption = "fixed",
 ) -> None:
     changes = options.changes()
-    refuse_for_maps(changes, "it is what is searched")
+    refuse_for_maps(changes, "it searches them")
     cases = [Case.of(scene, changes) for scene in dict.fromkeys(scenes or cutoff.SCENES)]
     options.finish(cutoff.study(cases, mapper_of(options, backend, starts)))

@@ -1,4 +1,4 @@
-"""The error for invalid input, and the one line that is printed of any error."""
+"""The error for invalid input, and the one line in which any error is printed."""
 
 import re
 
@@ -9,7 +9,7 @@ WORD_MAX = 200
 def one_line(message: str) -> str:
     """Return a message as it is printed: no character of it breaks the line, and no word is longer than `WORD_MAX`.
 
-    Line breaks and other characters that do not print, which may be in the name of a file, are escaped.
+    Line breaks and other unprintable characters, for instance in the name of a file, are escaped.
     """
     text = "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in message)
     half = WORD_MAX // 2 - 2
@@ -17,4 +17,4 @@ def one_line(message: str) -> str:
 
 
 class BadInput(Exception):
-    """Invalid input: one line that says what is wrong with it, and what is accepted."""
+    """Invalid input. The message is one line: the fault, and the accepted values."""

@@ -22,11 +22,16 @@ def command(
     reading: Annotated[
         Literal["3-30", "30-300"] | None,
         typer.Option(
-            "--axis", metavar="B", help="range of the paper's B axis, N s/m: 3-30 or 30-300", show_default="both"
+            "--axis",
+            metavar="B",
+            help="assumed range of the damping axis of Figure 5, N s/m: 3-30 or 30-300",
+            show_default="both",
         ),
     ] = None,
-    evaluations: Annotated[int, typer.Option(min=1, max=10**9, help="approximate number of trials of a search")] = 576,
-    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="seed of the searches")] = 1,
+    evaluations: Annotated[
+        int, typer.Option(min=1, max=10**9, help="approximate number of devices that a search tries")
+    ] = 576,
+    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="seed of the random numbers of the searches")] = 1,
     starts: StartsOption = 3,
     backend: ModelOption = "fixed",
 ) -> None:

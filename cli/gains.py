@@ -13,5 +13,5 @@ def command(
     options: StudyOptions, scene: SceneArgument = "seed-2011", starts: StartsOption = 3, backend: ModelOption = "fixed"
 ) -> None:
     changes = options.changes()
-    refuse_for_maps(changes, "it is what is searched")
+    refuse_for_maps(changes, "it searches them")
     options.finish(gains.study(Case.of(scene, changes), mapper_of(options, backend, starts)))

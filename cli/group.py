@@ -15,45 +15,45 @@ from .plain_numbers import is_plain
 from .terminal import hear_stages
 
 COMMANDS = {
-    "hit": "Hit the wall: the founding paper's protocol, and whether the wall is stable.",
-    "replay": "Put recorded counts, or captured edges, through an estimator; the RTL gets them through its pins.",
-    "table": "Print reports of hits side by side.",
-    "bench": "Measure the closed loop's speed on every backend and under cocotb, and what optional parts cost.",
-    "verilog": "Write the axis of a scene as Verilog, with a table of its ports, and what a board needs around it.",
+    "hit": "Simulate a hit of the wall by the founding paper's protocol; say whether the wall is stable.",
+    "replay": "Run a velocity estimator on recorded counts, or on the edges of a logic analyser's capture.",
+    "table": "Print the JSON reports of several hits as one table.",
+    "bench": "Measure the speed of the closed loop: every backend, cocotb, and what each optional part costs.",
+    "verilog": "Write the axis of a scene as Verilog, with a table of its ports; --board adds what a board needs.",
     "virtual": "Run the board of a scene, with its plant, behind a serial port that a host opens.",
-    "connect": "What the board at a port is: its identity, its state, why it tripped, and every register.",
+    "connect": "Show the board at a port: its identity, its state and why it tripped; with --registers every register.",
     "set": "Write words of a board, in SI units, and commit them together.",
     "config": "Save the words of a board to a file, load them into it again, or show what differs.",
-    "share": "Have the port of a board for several programs: one that writes, and any number that read.",
-    "arm": "Let a board drive, and keep it so while this command runs.",
-    "disarm": "Make a board's drive 0.",
-    "home": "Find the index of a board's encoder by hand, and make it the origin.",
-    "capture": "Capture a board's samples at their full rate around an event, into a file and a picture.",
-    "watch": "Show what a board's axis does.",
-    "panel": "A page in the browser to see a board, set it and arm it; with `virtual`, to feel the wall of one "
-    "in simulation.",
-    "board": "From a scene to a bitstream for a board, with its wiring; and into the board, if it is connected.",
-    "synth": "Size and speed of the axis, as the board with supervisor and link, on a real part.",
-    "accuracy": "Hold velocity estimators against the exact derivative of known motions, at any rate.",
-    "costs": "What each estimator takes of a device: alone, and the board with it placed and routed "
+    "share": "Share the port of a board among several programs: one of them writes, any number read.",
+    "arm": "Arm a board, so that it drives its motor, and keep it armed while this command runs.",
+    "disarm": "Disarm a board: its drive becomes 0.",
+    "home": "Wait until a hand moves the handle over the encoder's index, and give the index a position.",
+    "capture": "Record a board's samples around an event, at up to the full sample rate, into a file and a picture.",
+    "watch": "Show the state, position, velocity and force of a board's axis as they change.",
+    "panel": "Serve a page for the browser, on which a board is watched, set and armed; `virtual` takes a simulated "
+    "board.",
+    "board": "Build a bitstream and the wiring instructions for a board from a scene; --program loads the bitstream.",
+    "synth": "Synthesise a scene's axis, supervisor and link for an FPGA: its logic cells and highest clock rate.",
+    "accuracy": "Measure the error of velocity estimators at every sample rate, on known motions or on recordings.",
+    "costs": "Count the logic cells of each estimator on an FPGA, and the highest clock rate of a board with it "
     "(a minute or two each).",
-    "axes": "What 1 to 32 axes in one pipeline take of an ECP5, and how fast each is: with supervisors, without pins "
+    "axes": "Count the logic cells of 1 to 32 axes in one pipeline on an ECP5, and give their highest sample rate "
     "(some minutes each).",
-    "choose": "The table to choose an estimator by: its error in each situation, all with one set of gains, "
+    "choose": "Print a table to choose an estimator by: its error in each situation, with one set of gains, "
     "and its cost.",
-    "bits": "What a bit buys: error and logic as the words of an estimator shrink bit by bit from the derived widths.",
-    "zwidth": "Map the walls that are stable: for each estimator, the largest stiffness at every damping.",
-    "lipschitz": "The bound C on the acceleration, from sines fitted to a hit, and the gains that follow: "
-    "the paper's Figure 4.",
-    "trade": "Speed against accuracy: what a coarser backend, device, rate, solver or map saves, "
-    "and what it gets wrong.",
-    "cutoff": "The best cutoff of a filter behind a finite difference: the area of the stable region against it.",
-    "gains": "Levant's gains, searched in full: the area of the stable region over lambda and alpha, for both outputs.",
-    "rates": "What rate buys a stiff wall, 1 kHz to 1 MHz, and which part of the device ends it.",
-    "rendered": "What a wall renders of the stiffness and damping that it is commanded, by frequency, and its "
-    "rate-hardness at contact.",
-    "drop": "Why Levant's stable region ends at one damping, in a sharp drop; and estimators that have none.",
-    "fit": "Search what the paper does not give (mass, friction, delay ...) for a device that shows its Figure 5.",
+    "bits": "Show how the error grows and the logic shrinks as the words of an estimator lose one bit after another.",
+    "zwidth": "Map the stable walls: for each estimator, the largest stable stiffness at every damping.",
+    "lipschitz": "Estimate C, the bound on the acceleration, from sines fitted to a hit; give Levant's gains for it "
+    "(Figure 4 of the paper).",
+    "trade": "Compare speed and accuracy: the time that a coarser backend, device, rate, solver or map saves, "
+    "and its errors.",
+    "cutoff": "Find the best cutoff of the filter after a finite difference, by the area of the stable region.",
+    "gains": "Search Levant's gains on a grid of lambda and alpha, by the area of the stable region, for both outputs.",
+    "rates": "Find the stiffest stable wall by sample rate, 1 kHz to 1 MHz, and the part of the device that limits it.",
+    "rendered": "Compare the stiffness and damping that a wall renders with those commanded, by frequency; and its "
+    "rate-hardness.",
+    "drop": "Test why Levant's stable region ends sharply at one damping, and which estimators have no such drop.",
+    "fit": "Search mass, friction, delay and whatever else the paper omits, for a device that reproduces its Figure 5.",
 }
 """The purpose of every command in one line, which is all of its help except the options."""
 
@@ -81,7 +81,7 @@ class LazyGroup(TyperGroup):
 def loaded(name: str) -> Any:
     """Import the module of a command; return the command with its options.
 
-    The modules have the names of `COMMANDS`: a table of 30 imports would load them all, for a help that needs none.
+    The modules have the names of `COMMANDS`: a table of 30 imports would load them all; a help needs none.
     """
     alone = typer.Typer(add_completion=False)
     alone.command(name, help=COMMANDS[name])(import_module(f".{name}", __package__).command)
@@ -125,7 +125,7 @@ app = typer.Typer(
 @app.callback()
 def _options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="print the version, and end")
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="print the version and exit")
     ] = False,
 ) -> None:
     pass
@@ -146,7 +146,7 @@ def run() -> None:
 
         raise BadInput(refusal(error)) from None
     except (KeyError, ValueError):
-        # A shell that asks without the words so far is told nothing: what is printed stands in its user's line.
+        # A shell that asks without the words so far gets nothing: any output would land in its user's line.
         if COMPLETING not in os.environ:
             raise
         sys.exit(1)

@@ -31,13 +31,22 @@ def command(
     estimator: EstimatorOption = None,
     output: OutputOption = None,
     backend: BackendOption = "fixed",
-    stiffness: Annotated[float | None, typer.Option(help="stiffness of the wall, N/m")] = None,
-    damping: Annotated[float | None, typer.Option(help="damping of the wall, N s/m")] = None,
+    stiffness: Annotated[
+        float | None, typer.Option(help="stiffness of the wall, N/m", show_default="the scene's")
+    ] = None,
+    damping: Annotated[
+        float | None, typer.Option(help="damping of the wall, N s/m", show_default="the scene's")
+    ] = None,
     trace: Annotated[
-        Path | None, typer.Option(metavar="FILE", help=".npz: the samples; .fst: a waveform of the contact (rtl)")
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="write the samples into an .npz, or a waveform of the contact into an .fst (--backend rtl)",
+        ),
     ] = None,
     beside: Annotated[
-        str | None, typer.Option(metavar="SCENE", help="another scene to hit, too; --plot then takes .gif as well")
+        str | None,
+        typer.Option(metavar="SCENE", help="another scene, to hit beside the first; --plot then also takes a .gif"),
     ] = None,
 ) -> None:
     changes = options.changes(
@@ -69,19 +78,19 @@ def command(
 def _hit_axes(options: StudyOptions, scene: AxesScene, backend: str, trace: Path | None) -> None:
     """Hit the walls of several axes, whose result has a picture of its own."""
     if trace and trace.suffix != ".npz":
-        raise BadInput(f"--trace {trace.name} is a waveform of one axis; the traces of several go to an .npz")
+        raise BadInput(f"--trace {trace.name} is a waveform of one axis: for a scene of several axes give an .npz")
     with progress(f"{scene.name} {scene.spec.estimator} {backend}", scene.samples * len(scene.axes)) as advance:
         result = hit_axes.run(scene, backend, bool(options.plot or trace), advance)
     replace(options, command="hit_axes").finish(result, {"trace": (trace, result.save)} if trace else {})
 
 
 def _hit_beside(options: StudyOptions, scenes: tuple[Scene | AxesScene, ...], backend: str, trace: Path | None) -> None:
-    """Hit the walls of two scenes, whose result has a picture of its own, which may move."""
+    """Hit the walls of two scenes. The result has its own picture, still or in motion."""
     for each in scenes:
         if isinstance(each, AxesScene):
-            raise BadInput(f"--beside puts hits of one axis side by side, and {each.name} has several")
+            raise BadInput(f"--beside needs scenes of one axis: {each.name} has several")
     if trace:
-        raise BadInput("--trace must be absent with --beside: the traces of each hit go to a file of their own")
+        raise BadInput("--trace must be absent with --beside: trace each hit in its own run")
     samples = sum(each.samples for each in scenes)
     with progress(f"{' beside '.join(each.name for each in scenes)} {backend}", samples) as advance:
         result = hit_beside.run(scenes, backend, bool(options.plot), advance)

@@ -16,11 +16,11 @@ from .terminal import log
 def command(
     options: ReportOptions,
     port: PortArgument,
-    at: Annotated[float, typer.Option(metavar="M", help="the position of the index, m")] = 0.0,
+    at: Annotated[float, typer.Option(metavar="M", help="position that the index gets, m")] = 0.0,
     baud: BaudOption = BAUD,
     identity: IdentityOption = None,
     pace: PaceOption = None,
-    seconds: Annotated[float, typer.Option(metavar="S", help="the longest wait")] = 60.0,
+    seconds: Annotated[float, typer.Option(metavar="S", help="longest wait for the index, 0 to 1e6 s")] = 60.0,
 ) -> None:
     within(seconds, "--seconds", 0.0, 1e6, "s")
     with axis_at(port, baud, identity, pace) as axis:

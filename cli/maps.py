@@ -1,4 +1,4 @@
-"""What makes the maps of stable walls as the options say: by threads of this machine, or by a Dask cluster."""
+"""The maker of maps of stable walls, as the options say: with threads of this machine, or on a Dask cluster."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
@@ -13,7 +13,7 @@ from .terminal import progress
 
 
 def mapper_of(options: StudyOptions, backend: str, starts: int) -> Mapper:
-    """Return what makes maps; raise BadInput if no cluster can be what the options ask for."""
+    """Return the maker of maps; raise BadInput if the options describe no possible cluster."""
     _check_cluster(options)
     pool_for = partial(pool_of, workers=options.workers, scheduler=options.scheduler)
     return Mapper(backend, starts, Store("zwidth", options.resume), pool_for, progress)
@@ -34,7 +34,7 @@ def mapper_of_one_pool(options: StudyOptions, backend: str, starts: int, cases: 
 
 
 def _check_cluster(options: StudyOptions) -> None:
-    """Raise BadInput if no cluster can be what the options `--workers` and `--scheduler` ask for."""
+    """Raise BadInput if the options `--workers` and `--scheduler` describe no possible cluster."""
     if options.scheduler is None:
         return
     from ..sim.jobs import cluster  # noqa: PLC0415  (Dask is loaded only if there is a cluster)

@@ -26,46 +26,65 @@ EstimatorOption = Annotated[
     ),
 ]
 OutputOption = Annotated[
-    str | None, typer.Option(help="output of the estimator, e.g. u or u1", show_default="its first")
+    str | None, typer.Option(help="output of the estimator, e.g. u or u1", show_default="its first output")
 ]
 EstimatorsOption = Annotated[
     str | None,
-    typer.Option("--estimators", metavar="NAME[:OUTPUT],...", help="estimators, or `all`", show_default="all"),
+    typer.Option(
+        "--estimators", metavar="NAME[:OUTPUT],...", help="estimators to compare, or `all`", show_default="all"
+    ),
 ]
 
 
 def methods_option(default: str) -> Any:
     """Return the option for estimators by name or by the founding paper's methods, with its default in words."""
     listed = "NAME[:OUTPUT],..."
-    return typer.Option("--estimators", metavar=listed, help="estimators, as zwidth takes them", show_default=default)
+    return typer.Option(
+        "--estimators", metavar=listed, help="estimators, or methods of the paper, as for zwidth", show_default=default
+    )
 
 
-BackendOption = Annotated[Backend, typer.Option(help="float64 algorithm, bit-accurate model, or the Verilated RTL")]
-ModelOption = Annotated[Literal["float", "fixed"], typer.Option(help="float64 algorithm, or bit-accurate model")]
+BackendOption = Annotated[
+    Backend, typer.Option(help="float: float64 algorithm; fixed: bit-accurate model; rtl: the RTL in Verilator")
+]
+ModelOption = Annotated[
+    Literal["float", "fixed"], typer.Option(help="float: float64 algorithm; fixed: bit-accurate model")
+]
 AxesOption = Annotated[
     int | None,
     typer.Option(
-        min=1, max=AXES_MAX, metavar="N", help="several axes, each at the scene's rates", show_default="one alone"
+        min=1,
+        max=AXES_MAX,
+        metavar="N",
+        help="number of axes that share one pipeline, each at the scene's rates",
+        show_default="one axis without a pipeline",
     ),
 ]
-SeedsOption = Annotated[int, typer.Option(min=1, max=99, help="number of placements; fmax is their median")]
-RateOption = Annotated[float, typer.Option(metavar="HZ", help="sample rate")]
+SeedsOption = Annotated[int, typer.Option(min=1, max=99, help="number of placements; fmax is the median")]
+RateOption = Annotated[float, typer.Option(metavar="HZ", help="sample rate, 1e3 to 1e7 Hz")]
 
 WorkersOption = Annotated[
-    int | None, typer.Option(min=1, max=1024, help="number of threads", show_default="one a core")
+    int | None, typer.Option(min=1, max=1024, help="number of threads", show_default="one per core")
 ]
 SchedulerOption = Annotated[
-    str | None, typer.Option(metavar="ADDRESS", help="address of a running Dask cluster, whose workers are used")
+    str | None, typer.Option(metavar="ADDRESS", help="run on the workers of the Dask cluster at this address")
 ]
 StartsOption = Annotated[
-    int, typer.Option(min=1, max=10_000, metavar="N", help="number of starts that every wall at the edge is hit from")
+    int,
+    typer.Option(
+        min=1, max=10_000, metavar="N", help="number of starting points for each hit near the stability limit"
+    ),
 ]
-ResumeOption = Annotated[bool, typer.Option("--resume", help="go on where an interrupted run ended")]
+ResumeOption = Annotated[bool, typer.Option("--resume", help="continue an interrupted run")]
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="change a key of the scene; an empty value takes it out"),
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="change a key of the scene, e.g. wall.stiffness_n_per_m=2e3; an empty value removes it",
+    ),
 ]
-PlotOption = Annotated[Path | None, typer.Option(metavar="FILE", help="draw the result: .png, .svg or .pdf")]
+PlotOption = Annotated[Path | None, typer.Option(metavar="FILE", help="draw the result into a .png, .svg or .pdf")]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON on stdout, and nothing else")]
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 VIRTUAL = "virtual"
 """The word for a board in simulation."""
 SCENE = "seed-2011"
-"""The scene of such a board, which then has a clock at which it runs at about the pace of the real one."""
+"""The default scene of a board in simulation, with a clock at which it runs at about real speed."""
 
 
 class Place(NamedTuple):
@@ -42,30 +42,44 @@ class Place(NamedTuple):
             return kept_token(self.port, self.renew)
         if self.renew:
             raise BadInput(
-                "--new-token is for a page at a fixed port (--http) of this machine: others have a new one anyway"
+                "--new-token needs a fixed port (--http) of this machine: other pages get a new token at each start"
             )
         return new_token()
 
 
 def command(
     port: Annotated[
-        str, typer.Argument(metavar="PORT|virtual", help="a port, as of `hardwall connect`; or a board in simulation")
+        str,
+        typer.Argument(
+            metavar="PORT|virtual", help="a port, as for `hardwall connect`; or `virtual`, a board in simulation"
+        ),
     ],
     scene: Annotated[
         str | None,
-        typer.Argument(metavar="SCENE", help="the scene of that", show_default=f"{SCENE}, with a clock of 4 MHz"),
+        typer.Argument(
+            metavar="SCENE", help="scene of the board in simulation", show_default=f"{SCENE}, with a clock of 4 MHz"
+        ),
     ] = None,
     estimator: EstimatorOption = None,
     set_: SetOption = None,
     baud: Annotated[
-        int | None, typer.Option(min=1, max=BAUD_MAX, help="the board's rate", show_default=f"{BAUD}")
+        int | None,
+        typer.Option(min=1, max=BAUD_MAX, help="baud rate of the board's serial line", show_default=f"{BAUD}"),
     ] = None,
     identity: IdentityOption = None,
     pace: PaceOption = None,
-    host: Annotated[str, typer.Option(metavar="ADDRESS", help="the address at which the page is served")] = LOCAL,
-    http: Annotated[int, typer.Option(min=0, max=65535, metavar="PORT", help="its port; 0 for any that is free")] = 0,
+    host: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="address of this machine at which the page is served")
+    ] = LOCAL,
+    http: Annotated[
+        int,
+        typer.Option(min=0, max=65535, metavar="PORT", help="port at which the page is served; 0 takes any free one"),
+    ] = 0,
     renew: Annotated[
-        bool, typer.Option("--new-token", help="give the page another address than the one that is kept for --http")
+        bool,
+        typer.Option(
+            "--new-token", help="replace the secret token in the page's address, which is kept for the port --http"
+        ),
     ] = False,
     seconds: SecondsOption = None,
 ) -> None:

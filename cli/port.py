@@ -1,4 +1,4 @@
-"""What the commands that speak to a board share: their options, its axis, and its errors."""
+"""The common part of the commands for a board: options, its axis, and its errors."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,20 +15,28 @@ from .errors import BadInput
 from .options import within
 
 PortArgument = Annotated[
-    str, typer.Argument(metavar="PORT", help="a serial port, e.g. of /dev/serial/by-id; or tcp://HOST:PORT")
+    str,
+    typer.Argument(
+        metavar="PORT", help="serial port, e.g. /dev/ttyUSB0 or a name in /dev/serial/by-id; or tcp://HOST:PORT"
+    ),
 ]
-BaudOption = Annotated[int, typer.Option(min=1, max=BAUD_MAX, help="the board's rate")]
+BaudOption = Annotated[int, typer.Option(min=1, max=BAUD_MAX, help="baud rate of the board's serial line")]
 IdentityOption = Annotated[
-    str | None, typer.Option(metavar="HASH", help="the identity that the board must have", show_default="any")
+    str | None,
+    typer.Option(
+        metavar="HASH", help="refuse a board with another identity, as `hardwall connect` shows it", show_default="any"
+    ),
 ]
-AcknowledgeOption = Annotated[bool, typer.Option("--acknowledge", help="acknowledge what is latched")]
+AcknowledgeOption = Annotated[bool, typer.Option("--acknowledge", help="acknowledge the latched causes of a trip")]
 SecondsOption = Annotated[
-    float | None, typer.Option(metavar="S", help="time to run", show_default="until it is interrupted")
+    float | None, typer.Option(metavar="S", help="time to run, 0 to 1e6 s", show_default="until interrupted")
 ]
 PaceOption = Annotated[
     float | None,
     typer.Option(
-        metavar="PACE", help="seconds of a slow simulation in a second, or fewer", show_default="what it tells"
+        metavar="PACE",
+        help="speed of a slow simulation, 0.001 to 1: its seconds in a real second, or fewer",
+        show_default="told by a board on this machine, else 1",
     ),
 ]
 

@@ -19,15 +19,21 @@ RATES = ("controller.sample_hz", "controller.actuation_hz", "controller.clock_hz
 def command(
     options: StudyOptions,
     scene: SceneArgument = "drive-2011",
-    wanted: Annotated[str | None, methods_option("six of all")] = None,
+    wanted: Annotated[str | None, methods_option(",".join(rates.METHODS))] = None,
     tried: Annotated[
-        str | None, typer.Option("--rates", metavar="HZ,...", help="sample rates, ascending", show_default="1e3 to 1e6")
+        str | None,
+        typer.Option(
+            "--rates",
+            metavar="HZ,...",
+            help="sample rates, 1e3 to 1e7 Hz",
+            show_default=",".join(f"{rate:g}" for rate in rates.RATES_HZ),
+        ),
     ] = None,
     starts: StartsOption = 3,
     backend: ModelOption = "fixed",
 ) -> None:
     changes = options.changes()
-    refuse_for_maps(changes, "it is what is searched")
+    refuse_for_maps(changes, "it searches them")
     refuse(changes, RATES, "see --rates")
     rates_hz = sorted(rates_of(tried, "--rates")) if tried is not None else list(rates.RATES_HZ)
     case = Case.of(scene, changes)

@@ -1,4 +1,4 @@
-"""The options that say how a recording is to be read, which `replay` and `accuracy` share."""
+"""The options for reading a recording, shared by `replay` and `accuracy`."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,44 +24,63 @@ CHANNELS = 2, 3
 
 @dataclass(frozen=True, kw_only=True)
 class ReadingOptions(StudyOptions):
-    """The options of a recording; those of a study come with them, with the keys of a replay in place of a scene's."""
+    """The options of a recording and of a study; `--set` takes the keys of a replay instead of a scene's."""
 
     set_: Annotated[
         list[str] | None,
         typer.Option(
             "--set",
             metavar="controller.KEY=VALUE",
-            help="gains.ESTIMATOR.NAME, jerk_max_counts_per_s3 or edge_error_max_counts, as a scene's in counts",
+            help="change gains.ESTIMATOR.NAME, jerk_max_counts_per_s3 or edge_error_max_counts, in counts, not m",
         ),
     ] = None
     rate: Annotated[
-        float | None, typer.Option(metavar="HZ", help="sample rate of a recording", show_default="from its times")
+        float | None, typer.Option(metavar="HZ", help="sample rate of a recording, Hz", show_default="from its times")
     ] = None
     time: Annotated[
         str | None,
-        typer.Option(metavar="COLUMN", help="column of times, or `none`", show_default="by its name"),
+        typer.Option(
+            metavar="COLUMN",
+            help="column of times, by name or number; `none`: the file has no times",
+            show_default="found by its name",
+        ),
     ] = None
     time_unit: Annotated[
-        Literal[(*TIME_UNITS, "iso")] | None, typer.Option(help="unit of the times", show_default="by name or rate")
+        Literal[(*TIME_UNITS, "iso")] | None,
+        typer.Option(help="unit of the times", show_default="found by the column's name or by --rate"),
     ] = None
-    unit: Annotated[Literal[UNITS], typer.Option(help="unit of the column")] = "counts"
+    unit: Annotated[Literal[UNITS], typer.Option(help="unit of the positions")] = "counts"
     count: Annotated[
         str | None,
-        typer.Option(metavar="SIZE", help="size of a count in that unit, e.g. 0.005, 360/40000 or 2pi/2048"),
+        typer.Option(metavar="SIZE", help="size of a count in the unit --unit, e.g. 0.005, 360/40000 or 2pi/2048"),
     ] = None
     counter_bits: Annotated[
         int | None,
-        typer.Option(min=COUNTER_BITS[0], max=COUNTER_BITS[1], help="width of the counter", show_default="found"),
+        typer.Option(
+            min=COUNTER_BITS[0],
+            max=COUNTER_BITS[1],
+            help="width of the counter that wraps, bits",
+            show_default="found by its jumps",
+        ),
     ] = None
-    gaps: Annotated[Literal[RULES], typer.Option(help="what becomes of missing samples")] = "refuse"
+    gaps: Annotated[
+        Literal[RULES],
+        typer.Option(
+            help="missing samples: refuse the recording, hold the count, or split there and take the longest piece"
+        ),
+    ] = "refuse"
     channels: Annotated[
         str | None,
-        typer.Option(metavar="A,B[,Z]", help="channels of a capture, by name or number", show_default="by their names"),
+        typer.Option(
+            metavar="A,B[,Z]",
+            help="channels of a logic analyser's capture, by name or number",
+            show_default="found by their names",
+        ),
     ] = None
 
     @property
     def reading(self) -> Reading:
-        """What the options say of a file.
+        """The options for reading a file, checked.
 
         Raises:
             BadInput: if they contradict each other.
@@ -105,7 +124,7 @@ class ReadingOptions(StudyOptions):
 
 
 def say(recorded: Recording) -> None:
-    """Say on stderr what was understood of a file: with the result, for what is refused is one line alone."""
+    """Print on stderr how a file was read. It comes with the result, because a refusal is one line alone."""
     said = f"{Path(recorded.file).name}: {'; '.join(recorded.notes)}"
     log.print(one_line(said), style="dim", soft_wrap=True)
 
@@ -115,7 +134,7 @@ READING = "rate", "time", "time_unit", "unit", "count", "counter_bits", "gaps", 
 
 
 def _size(file: str | Path) -> int:
-    """Return the size of a file, bytes; 1 for one that is not there, which is said when it is read."""
+    """Return the size of a file, bytes; 1 for a missing file, which is reported when it is read."""
     try:
         return max(Path(file).stat().st_size, 1)
     except OSError:

@@ -1,4 +1,4 @@
-"""What is wrong with the value of an option, in the words in which a scene says it of a key."""
+"""Messages for bad values of options, in the words that a scene uses for its keys."""
 
 import typer
 from pydantic import Field, ValidationError

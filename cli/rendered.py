@@ -25,20 +25,31 @@ METHODS = "controller.estimator", "controller.output"
 def command(
     options: StudyOptions,
     scene: SceneArgument = "seed-2011",
-    wanted: Annotated[str | None, methods_option("seven of all")] = None,
+    wanted: Annotated[str | None, methods_option(",".join(rendered.METHODS))] = None,
     tried: Annotated[
         str | None,
-        typer.Option("--rates", metavar="HZ,...", help="rates besides the scene's own", show_default="1e3,1e4,1e6"),
+        typer.Option(
+            "--rates",
+            metavar="HZ,...",
+            help="sample rates besides the scene's, 1e3 to 1e7 Hz",
+            show_default="1e3,1e4,1e6",
+        ),
     ] = None,
     frequencies: Annotated[
-        str, typer.Option(metavar="HZ,...", help="frequencies of the handle inside of the wall, whole numbers")
+        str,
+        typer.Option(metavar="HZ,...", help="frequencies of the handle's motion inside the wall, 1 to 10000, whole Hz"),
     ] = ",".join(map(str, rendered.FREQUENCIES_HZ)),
-    amplitude: Annotated[float, typer.Option(metavar="MM", help="its amplitude")] = rendered.AMPLITUDE_MM,
-    speeds: Annotated[str, typer.Option(metavar="MM_PER_S,...", help="speeds at which it meets the wall")] = ",".join(
-        f"{speed:g}" for speed in rendered.SPEEDS_MM_PER_S
-    ),
+    amplitude: Annotated[
+        float, typer.Option(metavar="MM", help="amplitude of the handle's motion, 1e-6 to 100 mm")
+    ] = rendered.AMPLITUDE_MM,
+    speeds: Annotated[
+        str, typer.Option(metavar="MM_PER_S,...", help="speeds at which the handle meets the wall, 0.1 to 10000 mm/s")
+    ] = ",".join(f"{speed:g}" for speed in rendered.SPEEDS_MM_PER_S),
     window: Annotated[
-        float, typer.Option(metavar="MS", help="time W after the contact, for the rate of the force")
+        float,
+        typer.Option(
+            metavar="MS", help="time after the contact in which the rate of the force is taken, 0.01 to 100 ms"
+        ),
     ] = rendered.WINDOW_MS,
     starts: StartsOption = rendered.STARTS,
     backend: BackendOption = "fixed",

@@ -31,19 +31,28 @@ def command(
     ],
     column: Annotated[
         str | None,
-        typer.Option(help="the column of counts, by name or number", show_default="edges of a capture"),
+        typer.Option(help="column of counts, by name or number", show_default="none: the file is a capture of edges"),
     ] = None,
     coarsen: Annotated[
-        int, typer.Option(min=1, max=replay_plan.COARSEN_MAX, help="divide the counts, and judge against the full ones")
+        int,
+        typer.Option(
+            min=1,
+            max=replay_plan.COARSEN_MAX,
+            help="divide the counts by this number, and measure the error against the undivided ones",
+        ),
     ] = 1,
     estimator: Annotated[Estimator, typer.Option(help="velocity estimator")] = "levant",
     output: OutputOption = None,
     backend: BackendOption = "fixed",
     acceleration_max: Annotated[
         float | None,
-        typer.Option(metavar="C", help="acceleration that sets the gains, counts/s^2", show_default="the recording's"),
+        typer.Option(
+            metavar="C",
+            help="bound on the acceleration, which sets the gains, counts/s^2",
+            show_default="the recording's",
+        ),
     ] = None,
-    out: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="file for the velocities")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="write the velocities into this .csv")] = None,
 ) -> None:
     out = output_file(out, "--out", (".csv",), other_than=file)
     try:

@@ -46,7 +46,7 @@ class ReportOptions:
 
         Args:
             result: the result.
-            files: paths, and functions that write the files there, by what the files are.
+            files: by a name of each file, its path and the function that writes it.
 
         Raises:
             Exception: what failed; see `_do_all`.
@@ -100,7 +100,7 @@ def _write(what: str, path: Path, write: Callable[[Path], object]) -> None:
 
 
 def _make_folder_of(path: Path) -> None:
-    """Make the folder of a file, or of the one that a link leads to."""
+    """Make the folder of a file, or of a link's target."""
     try:
         Path(os.path.realpath(path)).parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -115,7 +115,7 @@ def _do_all(steps: Iterable[Callable[[], None]]) -> None:
     """Do every step, whichever of them fails.
 
     Raises:
-        Exception: the one that failed, or the first that must not fail.
+        Exception: if one step fails, its error; if several do, the first one that is no OSError or RuntimeError.
         RuntimeError: if several failed; the message names them all.
     """
     failures = []
@@ -132,7 +132,7 @@ def _do_all(steps: Iterable[Callable[[], None]]) -> None:
 
 
 def _pictures(name: str) -> Any:
-    """Return a module of pictures by `.` and its name, which is that of the command.
+    """Return a module of pictures by `.` and its name, the command's name.
 
     It is imported only if something is drawn: Matplotlib is slow, and commands of a board have no room `sim`.
     """
@@ -147,13 +147,13 @@ OUTPUT = {field.name for field in fields(ReportOptions)}
 
 
 def reports(*wanted: str, kind: type[ReportOptions] = ReportOptions) -> Callable[[Callable[..., None]], Callable]:
-    """Return a decorator that makes a command of a function whose first argument is a value of its shared options.
+    """Return a decorator that makes a command of a function; the function's first argument is its shared options.
 
     Typer reads options from a signature alone, so the shared ones are added to it: written out, a command would have up
     to six parameters more, only to pass them on.
 
     Args:
-        wanted: names of the shared options that the command has, besides `as_json`, which all commands have.
+        wanted: names of the shared options of the command; all commands have `as_json`, too.
         kind: the class of that value.
     """
 

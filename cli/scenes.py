@@ -1,4 +1,4 @@
-"""The options that say which scene, and what of it is changed or measured; and the checks of their values."""
+"""The options that choose a scene, its changes and what is measured; and the checks of their values."""
 
 from typing import Annotated, Any, Literal
 
@@ -25,8 +25,8 @@ def _scenes(incomplete: str) -> list[str]:
 
 
 def _scene_argument(kind: Any, default: bool | str) -> Any:
-    """Return the type of the argument that names a scene, whose help says what stands for none."""
-    said = f"{', '.join(names())}, or a .toml file"
+    """Return the type of the argument for a scene; its help names the default."""
+    said = f"the scene: {', '.join(names())}, or a .toml file"
     argument = typer.Argument(metavar="SCENE", help=said, autocompletion=_scenes, show_default=default)
     return Annotated[kind, argument]
 
@@ -36,10 +36,12 @@ SceneOfBoardArgument = _scene_argument(str | None, "the board's own, at a clock 
 SceneOrOfBoardArgument = _scene_argument(
     str | None, "seed-2011; with --board the board's own, at a clock that it makes"
 )
-DeviceOption = Annotated[PartName, typer.Option(help="the part to place and route for")]
+DeviceOption = Annotated[PartName, typer.Option(help="FPGA to place and route for")]
 EncoderSetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="encoder.KEY=VALUE", help="give the encoder an error: a key of a scene's encoder"),
+    typer.Option(
+        "--set", metavar="encoder.KEY=VALUE", help="give the encoder an error, by a key of a scene's section [encoder]"
+    ),
 ]
 
 
@@ -105,7 +107,7 @@ def refuse(changes: dict[str, Any], keys: tuple[str, ...], instead: str) -> None
     """Refuse changes of scene keys that the command sets itself; `instead` is the reason."""
     for key in changes:
         if key.startswith(keys):
-            raise BadInput(f"--set {shown(key)} is what this command sets itself: {instead}")
+            raise BadInput(f"--set {shown(key)} must be absent (this command sets it): {instead}")
 
 
 def refuse_for_maps(changes: dict[str, Any], estimators: str) -> None:

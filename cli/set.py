@@ -17,7 +17,9 @@ from .report import ReportOptions, reports
 def command(
     options: ReportOptions,
     port: PortArgument,
-    words: Annotated[list[str], typer.Argument(metavar="WORD=VALUE...", help="words in SI units")],
+    words: Annotated[
+        list[str], typer.Argument(metavar="WORD=VALUE...", help="words to write, in SI units, e.g. wall_stiffness=2e3")
+    ],
     baud: BaudOption = BAUD,
     identity: IdentityOption = None,
     pace: PaceOption = None,

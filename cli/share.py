@@ -25,7 +25,8 @@ def command(
     identity: IdentityOption = None,
     pace: PaceOption = None,
     tcp: Annotated[
-        int, typer.Option(min=0, max=65535, metavar="PORT", help="the port of 127.0.0.1; 0 for any that is free")
+        int,
+        typer.Option(min=0, max=65535, metavar="PORT", help="port of 127.0.0.1 for the programs; 0 takes any free one"),
     ] = 0,
     seconds: SecondsOption = None,
 ) -> None:
@@ -51,6 +52,6 @@ def command(
                 said = holder
                 print(f"lease: {holder or 'free'}", flush=True)
             if teller:
-                # What it tells is less than what it is told, by that margin.
+                # It tells less than it is told, by that margin.
                 teller.tell(relay.pace * MARGIN)
             time.sleep(LOOK_S)

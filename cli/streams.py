@@ -1,4 +1,5 @@
-"""The standard streams of the command line: what stdout cannot take is an error, and what stderr cannot is lost."""
+"""The standard streams of the command line. A failed write to stdout is an error; a failed write to stderr is
+ignored."""
 
 import errno
 import io
@@ -6,14 +7,14 @@ import os
 import sys
 
 CLOSED = 141
-"""The exit code if nobody reads stdout any more: that of a process that SIGPIPE ends."""
+"""The exit code if nobody reads stdout any more, as of a process ended by SIGPIPE."""
 
 
 class StdoutError(RuntimeError):
     """Stdout cannot be written.
 
     Attributes:
-        code: the exit code; the message is empty if nobody reads stdout any more, for then there is no fault.
+        code: the exit code; the message is empty if nobody reads stdout any more, because this is no fault.
     """
 
     def __init__(self, error: OSError):
@@ -43,7 +44,7 @@ def prepare() -> None:
         try:
             os.fstat(number)
         except OSError:
-            # A stream that was closed at the start would be the next file that is opened. This one cannot be written.
+            # If a stream is closed at the start, the next opened file takes its number. This one cannot be written.
             os.open(os.devnull, os.O_RDONLY)
     # Where a caller of `main` collects the output, its streams stay.
     if sys.stdout is sys.__stdout__:

@@ -30,7 +30,7 @@ class StudyOptions(ReportOptions):
     set_: SetOption = None
 
     def changes(self, **options: Any) -> dict[str, Any]:
-        """Return the changes of a scene, including those of a command's other options: see `changes_of`."""
+        """Return the changes of a scene, including the ones by a command's other options: see `changes_of`."""
         return changes_of(self.set_, **options)
 
     def results(self, title: str, function: Callable[..., Any], jobs: list[dict], store: Store) -> list[Any]:
@@ -42,7 +42,7 @@ class StudyOptions(ReportOptions):
 def study(
     *wanted: str, kind: type[StudyOptions] = StudyOptions
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Return a decorator that makes a command of a function whose first argument is a `StudyOptions`: see `reports`."""
+    """Return a decorator that makes a command of a function; its first argument is a `StudyOptions`: see `reports`."""
 
     def command_of(function: Callable[..., None]) -> Callable[..., None]:
         @functools.wraps(function)

@@ -22,7 +22,7 @@ Name = Annotated[str, Field(max_length=200)]
 
 
 class Report(BaseModel):
-    """What the table takes of a report of `hardwall hit`, which `sim.walls.hit.Hit.report` makes."""
+    """The part of a report of `hardwall hit` that the table needs; `sim.walls.hit.Hit.report` makes the report."""
 
     model_config = ConfigDict(strict=True)
 
@@ -55,7 +55,7 @@ class ReportOfAxes(BaseModel):
 
 
 def command(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE", help="JSON reports of `hardwall hit --json`")],
+    files: Annotated[list[Path], typer.Argument(metavar="FILE", help="reports that `hardwall hit --json` printed")],
 ) -> None:
     show(table_of(("run",), NUMBERS, [report.row() for file in files for report in _reports(file)]))
     for note in NOTES:
@@ -71,7 +71,7 @@ def _has_rows(content: bytes) -> bool:
 
 
 def _reports(file: Path) -> list[Report]:
-    """Return the report in a file, or those of several axes."""
+    """Return the report in a file, or the reports of several axes."""
     try:
         content = content_of(file, BYTES_MAX)
         if _has_rows(content):

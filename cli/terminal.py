@@ -22,7 +22,7 @@ SILENCE_S = 10.0
 GAP, EDGE = 2, 1
 """The numbers of spaces between two columns, and on either side of a table."""
 WORD_MAX = 20
-"""The length above which a word may be broken, so that a long name, of a file perhaps, leaves room for the numbers."""
+"""The length above which a word may be broken, so that a long name leaves room for the numbers."""
 
 
 def show(table: Table) -> None:
@@ -49,7 +49,7 @@ def show(table: Table) -> None:
 
 
 def _print(console: Console, drawn: rich.table.Table, rows: Iterable[Iterable[str]], least: int) -> None:
-    """Print a table of rows; a terminal that is narrower than `least` counts as that wide."""
+    """Print a table of rows; a terminal narrower than `least` counts as `least` wide."""
     for row in rows:
         drawn.add_row(*map(Text, row))
     console.width = max(console.width, least)
@@ -64,7 +64,7 @@ class _Column:
 
     @property
     def least(self) -> int:
-        """The least width: that of the numbers, or of the longest word."""
+        """The least width: the width of the numbers, or of the longest word."""
         words = [word[:WORD_MAX] for cell in self.cells for word in cell.split()]
         return max(map(len, [*(words if self.justify == "left" else self.cells), *self.heading.split()]), default=1)
 
@@ -120,8 +120,8 @@ def hear_stages() -> None:
 class progress:
     """The progress of a run on stderr: a bar in a terminal, elsewhere a line every `SILENCE_S`.
 
-    As a context it returns the function to call with the amount done. The bar comes with the first amount behind
-    `PATIENCE_S`, so that what is refused sooner leaves one line alone.
+    As a context it returns the function to call with the amount done. The bar comes with the first amount after
+    `PATIENCE_S`, so an early refusal is one line alone.
     """
 
     def __init__(self, title: str, total: int):

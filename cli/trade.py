@@ -20,7 +20,7 @@ LEAST = 5
 def command(options: StudyOptions, scene: SceneArgument = "drive-2011", starts: StartsOption = STARTS) -> None:
     changes = options.changes()
     if starts < LEAST:
-        raise BadInput(f"--starts must be {LEAST} or more, for fewer tell no move from chance, not {starts}")
+        raise BadInput(f"--starts must be {LEAST} or more, because fewer cannot tell a move from chance, not {starts}")
     refuse_for_maps(changes, "it takes two of the paper's")
     refuse(changes, ("solver",), "it is one of the settings")
     runs = trade.Runs(partial(mapper_of, options, starts=starts), starts, progress)

@@ -21,13 +21,13 @@ DEFAULT = "seed-2011"
 def command(
     scene: SceneOrOfBoardArgument = None,
     folder: Annotated[
-        str, typer.Option("-o", "--output-folder", metavar="DIR", help="folder for the files, made if absent")
+        str, typer.Option("-o", "--output-folder", metavar="DIR", help="folder for the files; it is made if absent")
     ] = ".",
     board: Annotated[
         str | None,
         typer.Option(
             metavar="BOARD",
-            help=f"write its top, pins and a core for FuseSoC too: {', '.join(BOARDS)}",
+            help=f"also write the top module, pins and FuseSoC core for a board: {', '.join(BOARDS)}",
             autocompletion=boards_beginning,
             show_default="none",
         ),

@@ -43,23 +43,28 @@ def command(
     scene: SceneArgument = "seed-2011",
     estimator: EstimatorOption = None,
     set_: SetOption = None,
-    speed: Annotated[float, typer.Option(help="the most simulated seconds in a second; 0 for no limit")] = 1.0,
+    speed: Annotated[float, typer.Option(help="most simulated seconds in a real second, 0 to 1000; 0: no limit")] = 1.0,
     tcp: Annotated[
-        int | None, typer.Option(min=0, max=65535, metavar="PORT", help="listen at this port of 127.0.0.1, too")
+        int | None,
+        typer.Option(
+            min=0, max=65535, metavar="PORT", help="also listen at this port of 127.0.0.1; 0 takes any free one"
+        ),
     ] = None,
     baud: Annotated[
-        int | None, typer.Option(min=BAUD_MIN, max=BAUD_MAX, help="rate of the serial line", show_default="the board's")
+        int | None,
+        typer.Option(min=BAUD_MIN, max=BAUD_MAX, help="baud rate of the serial line", show_default="the board's own"),
     ] = None,
     seconds: Annotated[
-        float | None, typer.Option(metavar="S", help="simulated time to run", show_default="until it is interrupted")
+        float | None,
+        typer.Option(metavar="S", help="simulated time to run, 0 to 1e6 s", show_default="until interrupted"),
     ] = None,
-    counts: Annotated[bool, typer.Option("--counts", help="print the encoder's count at every sample, too")] = False,
+    counts: Annotated[bool, typer.Option("--counts", help="also print the encoder's count at every sample")] = False,
     netlist: Annotated[
         str | None,
         typer.Option(
             metavar="FAMILY",
-            help=f"the board's netlist on a family of FPGAs, {', '.join(FAMILIES)}; much slower",
-            show_default="its Verilog",
+            help=f"simulate the synthesised netlist for an FPGA family, much slower: {', '.join(FAMILIES)}",
+            show_default="the Verilog",
         ),
     ] = None,
 ) -> None:
@@ -70,11 +75,11 @@ def command(
         raise BadInput(f"--netlist must be one of {', '.join(FAMILIES)}, not {shown(netlist)}")
     of = load(scene, changes_of(set_, controller__estimator=estimator))
     counted = _Counts() if counts else None
-    # What is entered first is left last: a terminal that takes no counts any more holds up nothing else.
+    # The first context is left last: a terminal that takes no more counts then blocks nothing else.
     counting = undone(counted.end) if counted else nullcontext()
     # A host that knows a port asks at once who tells its pace.
     with counting, Line(tcp) as line, Teller(line.names) as teller, VirtualBoard(of, baud, netlist) as board:
-        # The first call compiles, for which no host would wait.
+        # The first call compiles; no host would wait so long.
         board.run()
         print(f"serial port: {line.path}")
         if line.tcp_port is not None:

@@ -22,7 +22,7 @@ from .virtual import COUNTS
 CLOCK, CLOCK_HZ = "controller.clock_hz", 4_000_000
 """The clock at which `seed-2011` runs at about the pace of the real board."""
 WALL = {"wall_stiffness": 2000.0, "wall_damping": 10.0, "wall_position": 5e-3, "supervisor_force_limit": 20.0}
-"""What is written to it at the beginning, so that there is a wall to be felt."""
+"""The words written to it at the beginning: a wall to feel."""
 GAINS = {"levant_lambda": 3.5, "levant_alpha": 13.2, "levant_output": 1.0}
 """So too, where its estimator is Levant's: gains for accelerations of a hand, 12 m/s^2, and the smooth output. The
 paper's, for its walls, are larger."""
@@ -59,7 +59,8 @@ def _options(name: str, values: list[str]) -> list[str]:
 
 @contextmanager
 def _scene_file(scene: Scene, text: str) -> Iterator[Path]:
-    """Provide a file with the text of a scene, so that a board that starts later, or anew, runs what was read here."""
+    """Provide a file with the text of a scene, so that a board that starts later, or again, runs the scene as read
+    here."""
     folder = tempfile.TemporaryDirectory(prefix="hardwall-")
     with termination.undone(folder.cleanup):
         file = Path(folder.name) / f"{scene.name}.toml"

@@ -60,9 +60,13 @@ def command(
     identity: IdentityOption = None,
     pace: PaceOption = None,
     seconds: SecondsOption = None,
-    rate: Annotated[float, typer.Option(metavar="HZ", help="samples a second")] = RATE_HZ,
-    csv: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="new file for the samples, a line each")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="print the samples as JSON, an object a line")] = False,
+    rate: Annotated[float, typer.Option(metavar="HZ", help="samples in a second, 1e-3 to 1e3 Hz")] = RATE_HZ,
+    csv: Annotated[
+        Path | None, typer.Option(metavar="FILE.csv", help="write each sample as a line of this new file")
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="print each sample as a JSON object, on a line of its own")
+    ] = False,
 ) -> None:
     if seconds is not None:
         within(seconds, "--seconds", 0.0, 1e6, "s")
@@ -89,7 +93,8 @@ def command(
 
 @contextmanager
 def _objects(samples: Samples, identity: str) -> Iterator[Callable[[Sample], object]]:
-    """Yield what prints a sample as an object; the last object says what was missed, however this ends."""
+    """Yield a function that prints a sample as an object. However this ends, the last object tells the missed
+    samples."""
     ended: list[bool] = []
 
     def end(write: Callable[[str], object]) -> None:

@@ -25,8 +25,8 @@ def command(
         typer.Option(
             "--estimators",
             metavar="NAME[:OUTPUT],...",
-            help="`all`, some of all, or fdm-30, fdm-100, fdm-500, fdm-1000, proposed, adjusted",
-            show_default="these six",
+            help="estimators, `all`, or the paper's methods: fdm-30, fdm-100, fdm-500, fdm-1000, proposed, adjusted",
+            show_default="these six methods",
         ),
     ] = None,
     starts: StartsOption = STARTS,
@@ -35,13 +35,13 @@ def command(
         typer.Option(
             "--hands",
             metavar="NAME,...",
-            help=f"hands on the handle, and the worst of them: all, or some of {', '.join(HELD_BY)}",
+            help=f"map each of these hands on the handle, and the worst case: all, {', '.join(HELD_BY)}",
             show_default="the scene's",
         ),
     ] = None,
     backend: BackendOption = "fixed",
     hits: Annotated[
-        Path | None, typer.Option("--csv", metavar="FILE", help="write every start's verdict: .csv")
+        Path | None, typer.Option("--csv", metavar="FILE", help="write the verdict of every hit into this .csv")
     ] = None,
 ) -> None:
     changes = options.changes()

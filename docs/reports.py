@@ -3,12 +3,13 @@
 `docs/results/reports.toml` names them. `make results` runs the commands whose report is stale, or of those named by
 `ONLY`; `LIST=1` only says which are, and how long each took. A report is kept as `docs/results/reports/NAME.json`, with
 its command, the version, the date and the machine. Its origin is a digest of the code of every module that the command
-imports, but for those that only show or keep what was computed; comments and docstrings are no part of it. Where the
-command names its estimators, the others are no part of it either, so that a new estimator leaves most reports as they
-are.
+imports, except those that only show or keep results. Comments, docstrings, messages of errors and the help of options
+are no part of it. Where a command or its report names estimators, the others are no part of it either: a new estimator
+leaves most reports as they are.
 """
 
 import argparse
+import ast
 import datetime
 import functools
 import hashlib
@@ -43,6 +44,8 @@ HARDWARE = "hdl", "sim/boards", "sim/rtl"
 """Rooms that matter to what runs the RTL, or counts its cells."""
 OF_HARDWARE = "axes", "bench", "bits", "board", "choose", "costs", "synth"
 """Commands that do."""
+HELP = "help", "metavar", "show_default"
+"""Arguments of an option that only people read."""
 REGISTRIES = "model/estimators/registry.py", "hdl/estimators/registry.py"
 """What imports every estimator."""
 OF_EVERY = "accuracy", "bench", "bits", "choose", "costs"
@@ -126,10 +129,22 @@ def _files(name: str) -> Iterator[Path]:
         yield from (file for file in (inside.with_suffix(".py"), inside / "__init__.py") if file.is_file())
 
 
+class _Unsaid(ast.NodeTransformer):
+    """Takes out of a source what only people read: the messages of its errors, and the help of its options."""
+
+    def visit_Raise(self, node: ast.Raise) -> ast.Raise:
+        if isinstance(node.exc, ast.Call):
+            node.exc = node.exc.func
+        return node
+
+    def visit_keyword(self, node: ast.keyword) -> ast.keyword | None:
+        return None if node.arg in HELP else self.generic_visit(node)
+
+
 @functools.cache
 def _read(content: bytes, package: str) -> tuple[str, tuple[str, ...]]:
     """Return the code of a source, and the modules that it imports."""
-    return code_of(content), tuple(imported(content, package))
+    return ast.unparse(_Unsaid().visit(ast.parse(code_of(content)))), tuple(imported(content, package))
 
 
 def _source(file: Path) -> tuple[str, tuple[str, ...]]:
@@ -202,7 +217,7 @@ def origin(command: str, report: Mapping[str, Any] = NOTHING) -> str:
         digest.update(f"{file.relative_to(TREE)}\0{_source(file)[0]}\0".encode())
     own = (TREE / word for word in shlex.split(command) if word.endswith(".toml"))
     for scene in (*sorted((TREE / "sim/scene/builtin").glob("*.toml")), *own):
-        digest.update(scene.read_bytes())
+        digest.update(json.dumps(tomllib.loads(scene.read_text(encoding="utf-8")), default=str).encode())
     return digest.hexdigest()[:16]
 
 

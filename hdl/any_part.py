@@ -1,4 +1,4 @@
-"""The platform that Verilog is written for: no vendor's part, with attributes and files that tools of several read."""
+"""The platform of the written Verilog: no vendor's part; its attributes and files suit the tools of several vendors."""
 
 import re
 from typing import IO
@@ -9,11 +9,12 @@ from amaranth.lib.cdc import FFSynchronizer
 SYNCHRONISER = {"ASYNC_REG": "TRUE", "keep": "true"}
 """Attributes of every stage of a synchroniser: place the stages side by side, and neither merge nor move them."""
 ADDED = "added/"
-"""What tools call the files of others: their messages name `added/FILE`, and rules for our own text leave them out."""
+"""The names of others' files for the tools: messages name `added/FILE`, and rules for our own text skip these."""
 
 
 class AnyPart:
-    """A platform of Amaranth without a part, whose synchronisers have the attributes that tools of several parts read.
+    """A platform of Amaranth without a part. Its synchronisers have the attributes that the tools of several vendors
+    read.
 
     Attributes:
         files: the texts that components have added, by name.

@@ -31,7 +31,7 @@ class Block(wiring.Component):
 
     @property
     def design(self):
-        """The design of which this component is the hardware."""
+        """The design that this component implements."""
         return self._design
 
     @property

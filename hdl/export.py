@@ -53,7 +53,7 @@ def _with_start(text: str) -> str:
 
 @contextmanager
 def _home_for_yosys() -> Iterator[None]:
-    """Give Yosys, which runs in a process of its own, a home where the user has none that it can use."""
+    """Give Yosys, which runs in its own process, a home folder if the user has no usable one."""
     given = home_for_tools()
     before = {name: os.environ.get(name) for name in given}
     os.environ.update(given)

@@ -18,7 +18,7 @@ _INCLUDE = re.compile(r'^[ \t]*`include[ \t]+"([^"\n]+)".*$', re.MULTILINE)
 class VerilogModule(wiring.Component):
     """A module of existing Verilog: the test bench tests it as any component, and designs can contain it.
 
-    Clock and reset are those of its domain. The files come into the Verilog of the design as they are, with what they
+    Clock and reset come from its domain. The files come into the Verilog of the design as they are, with what they
     include from beside them.
 
     Parameters
@@ -38,9 +38,8 @@ class VerilogModule(wiring.Component):
     ------
     OSError
         If a file cannot be read.
-    ValueError
-        If a port has the name of the clock or of the reset, two files have one name, a file is no UTF-8, or a file
-        includes itself.
+    ValueError If a port has the name of the clock or of the reset; if two files have one name; if a file is no UTF-8,
+        or includes itself.
     """
 
     def __init__(
@@ -78,7 +77,7 @@ class VerilogModule(wiring.Component):
 
 
 def _whole(file: Path, above: tuple[Path, ...]) -> str:
-    """Return a file's text with what it includes; an include of what is not beside it is left to the tool."""
+    """Return a file's text with its included files; an include of a file that is not beside it is left to the tool."""
     try:
         text = file.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:

@@ -1,7 +1,7 @@
 """Ports of components by their names, which here alone become signals.
 
-A host's words and pulses, and the status that it reads, are listed by the designs of the model, which knows no signals.
-A port has the name of what it carries, so names are what a design and two components that are joined have in common.
+The designs of the model list a host's words and pulses, and the status that it reads. The model knows no signals. A
+port has the name of its signal. So a design and two joined components have the same names.
 """
 
 from collections.abc import Iterable, Mapping
@@ -19,12 +19,12 @@ def port(component: Component, name: str) -> Value:
 
 
 def ports(component: Component, names: Iterable[str] | None = None) -> dict[str, Value]:
-    """Return the ports of a component by name: all of them, or those of some names, in their order."""
+    """Return the ports of a component by name: all, or the named ones in this order."""
     return {name: port(component, name) for name in (component.signature.members if names is None else names)}
 
 
 def names_of(words: Iterable[Register | Word]) -> list[str]:
-    """Return the names of words or registers, which are those of their ports."""
+    """Return the names of words or registers; their ports have the same names."""
     return [word.name for word in words]
 
 

@@ -1,4 +1,4 @@
-"""What runs on the PC beside a board, real or virtual: `connect`, the axis in SI units, and what may go wrong."""
+"""The PC side of a board, real or virtual: `connect`, the axis in SI units, and the errors."""
 
 from ..model.runtime.extras import need
 

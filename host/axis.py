@@ -1,4 +1,4 @@
-"""An axis on a board: its wall, what it does, and the acts that let it drive."""
+"""An axis on a board: its wall, its status, and the calls that arm and disarm it."""
 
 import math
 import time
@@ -34,20 +34,20 @@ LATCHED = Trip(0, (), (), {})
 class Axis(Named):
     """An axis on a board, from `hardwall.host.connect`. A context manager that disarms and closes.
 
-    Acts of the application renew its lease: `set` and every attribute of `wall` and `supervisor`, `arm`, `renew`,
-    `sleep` and `watch`. While the lease lasts, half a second of the board, a thread beats; an application that hangs,
-    or only reads, ends in the trip link_timeout.
+    These calls renew the application's lease: `set`, every attribute of `wall` and `supervisor`, `arm`, `renew`,
+    `sleep` and `watch`. The lease lasts half a second of the board. While it lasts, a thread sends the heartbeat. If an
+    application hangs, or only reads, the axis trips with the cause link_timeout.
 
-    Several threads may use it: where one arms while another disarms or closes, the axis ends disarmed.
+    Several threads may use it. If one arms while another disarms or closes, the axis ends disarmed.
 
     Args:
         port: the line.
         device: the device there.
-        shared: what it shares with the other axes of the device, if there are any.
+        shared: the state shared with the other axes of the device; None for a single axis.
         number: the number of the axis on the device.
 
     Attributes:
-        device: what the board says of itself.
+        device: the board's identity and registers.
         wall: the wall.
         supervisor: the limits.
         capture: the capture memory.
@@ -63,14 +63,14 @@ class Axis(Named):
 
     def __init__(self, port: Port, device: Device, shared: Shared | None = None, number: int = 0):
         self.device, self._port = device, port
-        # The time, of time.monotonic, after which nothing that is written goes out, except a disarm and beats.
+        # The time, of time.monotonic, after which no write goes out, except a disarm and beats.
         self._until_s = math.inf
         self._words = Words(port, device, None if shared is None else shared.words, self._check_time)
         self.wall, self.supervisor = Wall(self), Supervisor(self)
         self.capture = Capture(self, number)
         self._status = device.of_kind(Kind.STATUS)
-        # Whether it may be ARMED by this program; and whether it may be, though this program does not want it: a host
-        # that has gone left it so, or an answer was lost. It is disarmed before the heartbeat goes on.
+        # Whether this program may have ARMED it; and whether it may be ARMED against this program's wish: by a host
+        # that has gone, or after a lost answer. It is disarmed before the heartbeat goes on.
         self._may_drive, self._unwanted = False, self.status.state is State.ARMED
         # Whether a disarming has begun since the last arming did. There is no lock, for one who ends this program must
         # not wait for a thread that is held up in `arm`.
@@ -104,17 +104,17 @@ class Axis(Named):
         return self._words.names
 
     def get(self, name: str) -> float:
-        """Return the SI value of a word as the axis uses it; the errors are those of `Words.get`."""
+        """Return the SI value of a word as the axis uses it. Errors: see `Words.get`."""
         return self._words.get(name)
 
     def set(self, **values: float) -> None:
-        """Write words in SI units, and commit them all at one sample; the errors are those of `Words.set`."""
+        """Write words in SI units, and commit them all at one sample. Errors: see `Words.set`."""
         self._let_go()
         self._words.set(values)
         self.renew()
 
     def read(self, name: str) -> int:
-        """Return the word of a register; its unit and format are those of `device.registers`.
+        """Return the word of a register; `device.registers` has its unit and format.
 
         Raises:
             KeyError: if there is no such register.
@@ -124,15 +124,15 @@ class Axis(Named):
         return register.from_registers(self._port.read(register.address, register.size))
 
     def read_registers(self, address: int, count: int) -> tuple[int, ...]:
-        """Return successive registers as they are; the errors are those of `Port.read`."""
+        """Return the raw words of successive registers. Errors: see `Port.read`."""
         return self._port.read(address, count)
 
     def line_s(self, count: int) -> float:
-        """Return the time that a read of so many registers takes of the line, s, by its baud rate."""
+        """Return the time that the line needs to read so many registers, s, from its baud rate."""
         return self._port.line_s(count)
 
     def pulse(self, name: str) -> None:
-        """Let a pulse go out.
+        """Send a pulse to the axis.
 
         Raises:
             KeyError: if there is no such register.
@@ -146,12 +146,13 @@ class Axis(Named):
 
     @contextmanager
     def by(self, until_s: float) -> Iterator[None]:
-        """Let acts write only until a time; from then on they raise LateError. A disarm and beats have no such time.
+        """Let calls write only until a time; from then on they raise LateError. A disarm and the heartbeat have no such
+        limit.
 
-        A board that does not answer is asked again and again: this way nothing is done long after it was wanted.
+        A board that does not answer is asked again and again. The limit keeps a late answer from doing an old wish.
 
         Args:
-            until_s: the last time at which a request to write goes out, s, of time.monotonic.
+            until_s: the last time at which a write is sent, s of time.monotonic.
         """
         before, self._until_s = self._until_s, until_s
         try:
@@ -161,7 +162,7 @@ class Axis(Named):
 
     def _check_time(self) -> None:
         if time.monotonic() > self._until_s:
-            raise LateError("the board did not answer in time: what was not done by then is not done any more")
+            raise LateError("the board did not answer in time: the rest was not sent")
 
     def _check_wanted(self) -> None:
         self._check_time()
@@ -170,18 +171,18 @@ class Axis(Named):
 
     @property
     def lease(self) -> str | None:
-        """The program that holds the lease of a board that is shared, empty if none does; None if it is not shared."""
+        """The program that holds the lease of a shared board, empty if none does; None if the board is not shared."""
         return self._port.lease
 
     @property
     def counters(self) -> dict[str, int]:
-        """What the link has counted since the board's reset, by name; they wrap at 65536."""
+        """The counters of the link since the board's reset, by name; they wrap at 65536."""
         block = self.device.of_kind(Kind.COUNTER)
         return dict(zip((each.name for each in block), self._port.read(block[0].address, len(block)), strict=True))
 
     @property
     def status(self) -> Status:
-        """What the axis does now."""
+        """The state, position, velocity, force and flags of the axis now."""
         last = self._status[-1]
         registers = self._port.read(TELEMETRY, last.address + last.size - TELEMETRY)
         words = {}
@@ -193,11 +194,11 @@ class Axis(Named):
 
     @property
     def trip(self) -> Trip | None:
-        """The causes that are latched; None if none is."""
+        """The latched causes of a trip; None if there are none."""
         return self.status.trip
 
     def renew(self) -> None:
-        """Show that the application lives: the heartbeat goes on for another half second of the board.
+        """Renew the lease: the heartbeat continues for another half second of the board.
 
         Raises:
             ChangedError: if the board was reset, or another host writes to it.
@@ -211,7 +212,7 @@ class Axis(Named):
 
     @property
     def is_left_armed(self) -> bool:
-        """Whether the axis is ARMED without a lease, or though it is not wanted; one that is being disarmed is not.
+        """Whether the axis is ARMED without a lease, or against the program's wish; False while it is being disarmed.
 
         Raises:
             HostError: if the board is not reached.
@@ -226,7 +227,7 @@ class Axis(Named):
         return LEASE_S / self._port.pace
 
     def sleep(self, seconds: float) -> None:
-        """Wait, and live meanwhile.
+        """Wait, and renew the lease meanwhile.
 
         Raises:
             FieldError: if the time is not finite, or negative.
@@ -240,7 +241,7 @@ class Axis(Named):
             self.renew()
 
     def watch(self, period_s: float = 0.05, seconds: float | None = None) -> Iterator[Status]:
-        """Yield the status again and again, and live meanwhile: for a time, or for ever.
+        """Yield the status again and again, and renew the lease meanwhile: for a time, or for ever.
 
         Raises:
             FieldError: if a time is not finite, or negative.
@@ -259,7 +260,8 @@ class Axis(Named):
             self.sleep(period_s)
 
     def arm(self) -> None:
-        """Let the axis drive, within limits that rise from 0. From now on the application must renew its lease.
+        """Arm the axis: it drives, within a force limit that rises from 0. From now on the application must renew its
+        lease.
 
         Raises:
             TrippedError: if causes are latched, or come at once.
@@ -289,7 +291,7 @@ class Axis(Named):
             raise NotReadyError("the axis was armed, and disarmed at once: the loop of drive_enable opened")
 
     def _check_ready(self) -> None:
-        """Live, and check that the board is the one that was read, and can be armed; the errors are those of `arm`."""
+        """Renew the lease; check that the board was not reset or exchanged, and can be armed. Errors: see `arm`."""
         if (found := read_identity(self._port)) != self.device.identity:
             raise ChangedError(
                 f"the board at {self._port.name} is now {found}, not {self.device.identity}: connect again"
@@ -306,11 +308,11 @@ class Axis(Named):
             raise NotReadyError(f"the axis cannot be armed: {self._why_not(status)}")
 
     def disarm(self) -> None:
-        """Make the drive 0, and let the heartbeat rest.
+        """Disarm the axis: the drive becomes 0, and the heartbeat stops.
 
         Raises:
-            HostError: if the board is not reached. Its watchdog then makes the drive 0, or the next act of this
-                program that would let the heartbeat go on disarms it first.
+            HostError: if the board is not reached. Its watchdog then makes the drive 0. If this program would let the
+                heartbeat continue first, its next call disarms the axis.
         """
         self._called_off = self._disarming = True
         try:
@@ -322,16 +324,17 @@ class Axis(Named):
             self._disarming = False
 
     def acknowledge(self, trip: Trip | None = LATCHED) -> None:
-        """Acknowledge a trip, exactly as it was read, and clear the flags: the axis is DISARMED, unless a cause stands.
+        """Acknowledge a trip, exactly as it was read, and clear the flags: the axis is DISARMED, unless a cause is
+        still present.
 
         It arms nothing.
 
         Args:
-            trip: what `trip` was; None, of an axis that was not tripped, acknowledges nothing. Without it what is
-                latched now is read, and acknowledged.
+            trip: the value of the attribute `trip` when it was read. None (the axis was not tripped) acknowledges
+                nothing. Without this argument the causes latched now are read and acknowledged.
 
         Raises:
-            TrippedError: if a cause stands, or another came since `trip` was read.
+            TrippedError: if a cause is still present, or another came since `trip` was read.
             HostError: if the board is not reached.
         """
         if trip is LATCHED:
@@ -339,14 +342,14 @@ class Axis(Named):
         if trip:
             word = self.device.registers["acknowledged"]
             self._port.write(word.address, word.to_registers(trip.latched), Sending(check=self._check_time))
-            # What the encoder says is a cause until the flags are cleared, so that comes first.
+            # The encoder's flags are a cause until they are cleared, so this comes first.
             self.pulse("clear_flags")
             self.pulse("acknowledge")
         if now := self.trip:
             raise TrippedError(f"the axis is still tripped: {now}")
 
     def preload(self, position_m: float) -> None:
-        """Say where the handle is, which must rest: the axis loses its reference.
+        """Set the position of the handle, m. The handle must be at rest. The axis loses its reference.
 
         Raises:
             FieldError: if the position is out of range.
@@ -356,19 +359,19 @@ class Axis(Named):
         self._move("preload", position_m)
 
     def shift_origin(self, by_m: float) -> None:
-        """Add to all positions, that of the handle and that of a latched index, at one clock. The handle may move.
+        """Add a length, m, to all positions at one clock: the handle's and a latched index's. The handle may move.
 
-        With a latched index the axis has its reference from then on.
+        With a latched index, the axis is referenced from then on.
 
         Raises:
-            FieldError: if the way is out of range.
+            FieldError: if the length is out of range.
             NotReadyError: if the axis is ARMED.
             HostError: if the board is not reached.
         """
         self._move("origin_shift", by_m)
 
     def _move(self, pulse: str, count_m: float) -> None:
-        """Let a pulse go out that moves the count, with its word."""
+        """Write a word and send the pulse that moves the count by it."""
         self.set(preload_count=count_m)
         try:
             self.pulse(pulse)
@@ -376,16 +379,16 @@ class Axis(Named):
             raise NotReadyError("the axis is ARMED: disarm it before its position is set") from error
 
     def homing(self, index_m: float = 0.0) -> Generator[str, None, Homed]:
-        """Home as `home` does, a look at a step: see `hardwall.host.homing.homing`."""
+        """Home as `home` does, one look at the axis per step: see `hardwall.host.homing.homing`."""
         return homing(self, index_m)
 
     def home(self, index_m: float = 0.0, seconds: float = 60.0) -> float:
-        """Wait until a hand has moved the handle over the index; then make the index the position `index_m`.
+        """Wait until a hand has moved the handle over the index; then give the index the position `index_m`.
 
-        Returns the position of the handle, which may move all the time.
+        Returns the position of the handle, m. The handle may move all the time.
 
-        A homing that does not end leaves the board waiting for its index, for which it has no way back, and without a
-        reference, until another one ends.
+        If a homing fails, the board still waits for its index, and is without a reference until a later homing ends.
+        There is no way back from this wait.
 
         Raises:
             FieldError: if `index_m` is beyond the range of positions, or would take the handle beyond it, or the time
@@ -402,7 +405,7 @@ class Axis(Named):
             except StopIteration as end:
                 return end.value.position_m
             if time.monotonic() > until:
-                raise TimeoutError(f"in {seconds:g} s there was not {waits_for}")
+                raise TimeoutError(f"in {seconds:g} s the axis did not see {waits_for}")
             self.sleep(HOMING_S)
 
     def _why_not(self, status: Status) -> str:
@@ -415,7 +418,8 @@ class Axis(Named):
         return "the loop of drive_enable is open"
 
     def _let_go(self) -> None:
-        """Disarm what this program does not want ARMED; where another one holds the lease, that one does."""
+        """Disarm an axis that this program does not want ARMED; if another program holds the lease, leave it to that
+        program."""
         if self._unwanted:
             if self.lease is not None:
                 # The beat that the board has already is none, but it needs the lease.

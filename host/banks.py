@@ -16,8 +16,8 @@ from .shared import Shared
 class BankPort(Port):
     """A port to the bank of one of several axes, by the addresses of an axis that is alone.
 
-    What there is once for all axes, the constants, the counters of the link, the words of the host itself and those of
-    the capture memory, is read and written where it is.
+    Some registers exist once for all axes: the constants, the counters of the link, and the words of the host and of
+    the capture memory. They are read and written at their own addresses.
 
     Args:
         port: the line.
@@ -36,12 +36,12 @@ class BankPort(Port):
 
     @property
     def pace(self) -> float:
-        """That of the line."""
+        """The pace of the line: see `Port.pace`."""
         return self._line.pace
 
     @property
     def lease(self) -> str | None:
-        """That of the line."""
+        """The lease of the line: see `Port.holder`."""
         return self._line.lease
 
     def line_s(self, count: int) -> float:
@@ -49,15 +49,15 @@ class BankPort(Port):
         return self._line.line_s(count)
 
     def first(self) -> AbstractContextManager[None]:
-        """Let the requests of this thread go before those of others."""
+        """Give this thread's requests precedence over other threads'."""
         return self._line.first()
 
     def relay(self, request: bytes) -> bytes:
-        """Return the answer to another program's request, whose addresses are those of the line."""
+        """Return the answer to another program's request; its addresses are the line's."""
         return self._line.relay(request)
 
     def read(self, address: int, count: int) -> tuple[int, ...]:
-        """Return successive registers; what there is once takes another request. Errors are those of `Port.read`."""
+        """Return successive registers; what there is once takes another request. Errors: see `Port.read`."""
         places = range(address, address + count)
         if not self._base or address >= END:
             return self._line.read(address, count)
@@ -70,7 +70,7 @@ class BankPort(Port):
         return tuple(registers[place] for place in places)
 
     def write(self, address: int, registers: tuple[int, ...], sending: Sending = PLAIN) -> None:
-        """Write successive registers, all in one request; the arguments and the errors are those of `Port.write`."""
+        """Write successive registers, all in one request; arguments and errors: see `Port.write`."""
         self._line.write(address + (0 if address in self._once else self._base), registers, sending)
 
     def identify(self) -> dict[int, bytes]:
@@ -84,10 +84,10 @@ class BankPort(Port):
 class Axes:
     """All axes on a board, from `hardwall.host.connect_axes`. A context manager that disarms each, and closes.
 
-    Each is an `Axis`, with words, states and acts of its own. The board hears one heartbeat. It goes on while the lease
-    of any of them lasts, but not beside one that is ARMED and whose lease has ended, or that an earlier host left so:
-    disarm that, or renew its lease. `supervisor_watchdog` is one word for all, and there is one capture memory, which
-    takes the axis whose `capture` was started last.
+    Each is an `Axis`, with words, states and acts of its own. The board hears one heartbeat. It continues while the
+    lease of any axis lasts. It stops beside an axis that is ARMED without a lease: after the end of its lease, or
+    because an earlier host left it ARMED. Disarm that axis, or renew its lease. `supervisor_watchdog` is one word for
+    all axes. There is one capture memory: it records the axis whose `capture` was started last.
 
     Args:
         port: the line.

@@ -1,4 +1,4 @@
-"""The range of a word as messages print it, and whether a value is within: what is printed is what is accepted."""
+"""The range of a word as messages print it, and the check of a value against exactly this range."""
 
 from ..model.checks import FieldError, check_number, shown
 from ..model.register import Register

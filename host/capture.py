@@ -23,14 +23,14 @@ PART_RECORDS = 15
 VALUES = "count", "velocity", "driven"
 """The status whose formats the values of a record have, in their order."""
 TAKEN = "capture_axis"
-"""The word of the axis that is captured, which a board of several axes has."""
+"""The word that selects the captured axis, on a board of several axes."""
 LOOK_S = 0.02
 """The time between two looks at the state of a capture."""
 
 
 @dataclass(frozen=True)
 class Captured:
-    """A capture: one element a record in every array, of which `place` are before the trigger.
+    """A capture. Every array has one element per record; `place` of the records are before the trigger.
 
     Attributes:
         time_s: time from the first record at the trigger or behind it, s.
@@ -80,7 +80,7 @@ class Captured:
 
 
 class Board(Protocol):
-    """What a capture needs of an axis: see `hardwall.host.axis.Axis`."""
+    """The part of `hardwall.host.axis.Axis` that a capture needs."""
 
     device: Device
 
@@ -100,7 +100,7 @@ class Board(Protocol):
 class Capture:
     """The capture memory of a board, for one of its axes.
 
-    Several axes have one memory, which takes the axis that was started last; for the others there is no capture then.
+    Several axes share one memory. It records the axis whose capture was started last; the others have none then.
 
     Args:
         board: the axis.
@@ -171,7 +171,9 @@ class Capture:
         """
         self._check()
         if (taken := self._taken) != self._axis:
-            raise NotReadyError(f"the capture is of axis {taken}, and not of axis {self._axis}: start one of this axis")
+            raise NotReadyError(
+                f"the capture is of axis {taken}, not of axis {self._axis}: start a capture of this axis"
+            )
         self._board.pulse("capture_trigger")
 
     def until(self, wanted: str, seconds: float) -> None:
@@ -190,7 +192,7 @@ class Capture:
             self._board.sleep(LOOK_S)
 
     def read(self, progress: Callable[[int], object] = lambda done: None, lives: bool = True) -> Captured:
-        """Return a capture that is done; the errors are those of `reading`.
+        """Return a capture that is done. Errors: see `reading`.
 
         Args:
             progress: called with the number of records that are read.
@@ -207,7 +209,7 @@ class Capture:
             progress(done)
 
     def reading(self) -> Generator[int, None, Captured]:
-        """Read a capture that is done, a request at a step, for who has more to do between two.
+        """Read a finished capture, one request per step, so that a caller can do other things in between.
 
         Yields the number of records that are read, and returns the capture.
 

@@ -1,4 +1,4 @@
-"""The clients of pymodbus by which a port is opened, read and written; and why one cannot be had."""
+"""The clients of pymodbus that open, read and write a port; and the reason why a port cannot be opened."""
 
 import errno
 import logging
@@ -23,10 +23,10 @@ logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)
 
 
 class SerialClient(ModbusSerialClient):
-    """The library's client, without its pauses of whole ms, and with the reason why a port cannot be had.
+    """The library's client, without its pauses of whole ms, and with the reason why a port cannot be opened.
 
     Attributes:
-        until_s: when it is no longer waited for bytes.
+        until_s: the time until which bytes are waited for, s of time.monotonic.
     """
 
     until_s = 0.0
@@ -35,7 +35,7 @@ class SerialClient(ModbusSerialClient):
         """Open the port, unless it is open.
 
         Raises:
-            OSError: if it cannot be had.
+            OSError: if it cannot be opened.
         """
         if not self.socket:
             to = self.comm_params
@@ -51,10 +51,10 @@ class SerialClient(ModbusSerialClient):
 
 
 class NetworkClient(ModbusTcpClient):
-    """The library's client, which says why a port cannot be had.
+    """The library's client, with the reason why a port cannot be opened.
 
     Attributes:
-        until_s: when it is no longer waited for bytes.
+        until_s: the time until which bytes are waited for, s of time.monotonic.
     """
 
     until_s = 0.0
@@ -116,14 +116,14 @@ def client_of(name: str, baud: int, wait_s: float) -> SerialClient | NetworkClie
 
 
 def reason(error: Exception) -> str:
-    """Return why a port cannot be had, and what helps."""
+    """Return the reason why a port cannot be opened, and the remedy."""
     number = getattr(error, "errno", None)
     if number == errno.ENOENT:
-        return "there is none of that name; `ls /dev/serial/by-id` shows those of boards that are plugged in"
+        return "there is no such port; `ls /dev/serial/by-id` lists the boards that are plugged in"
     if number in (errno.EACCES, errno.EPERM):
-        return "it is not yours to open; on most systems it is, once you are in the group dialout"
+        return "permission denied; on most systems your user must be in the group dialout"
     if number in (errno.EAGAIN, errno.EBUSY):
-        return "another program has it, and a board has one host at a time, unless `hardwall share` has it for several"
+        return "another program uses it; `hardwall share` shares a board among several programs"
     if number in (errno.ECONNREFUSED, errno.ETIMEDOUT):
         return "nothing listens there"
     if number == errno.EISDIR or "configure" in str(error):

@@ -23,7 +23,7 @@ BYTES_MAX = 10**6
 DIGITS = 17
 """The digits with which every float is told from every other."""
 FACTS = "identity", "clock_hz", "clocks_per_sample", "capture_registers", "axes"
-"""What a file says of its board: attributes of `Device`."""
+"""The facts on a board in its file: attributes of `Device`."""
 HEAD = """\
 # The words of a board, in SI units, for `hardwall config load PORT FILE`. A word that is left out stays as it is.
 
@@ -79,7 +79,9 @@ class Config:
         except (ValueError, RecursionError) as error:
             raise ConfigError(f"{name} is no TOML: {error}") from None
         if found.keys() != {"board", "words"} or not all(isinstance(each, dict) for each in found.values()):
-            raise ConfigError(f"{name} must have the tables [board] and [words] alone, as `hardwall config save` does")
+            raise ConfigError(
+                f"{name} must have only the tables [board] and [words], as `hardwall config save` writes them"
+            )
         facts, words = found["board"], found["words"]
         if facts.keys() != {*FACTS}:
             raise ConfigError(f"{name}: [board] must have {', '.join(FACTS)}, not {shown([*facts])}")
@@ -100,7 +102,7 @@ class Config:
             part.write_text(HEAD + "\n".join(lines) + "\n", encoding="utf-8")
 
     def differences(self, axis: Axis) -> list[Difference]:
-        """Return the words that are not what the axis uses, in the order of the board's words.
+        """Return the words whose values differ from those in use, in the order of the board's words.
 
         Raises:
             ChangedError: if the file is of another board; the message says what differs.
@@ -137,14 +139,14 @@ class Config:
         if axis.status.state is State.ARMED:
             raise NotReadyError("the axis is ARMED: disarm it before a configuration is loaded")
         if self.differences(axis) != list(differences):
-            raise ChangedError("the words of the board are others than those that were shown: nothing was loaded")
+            raise ChangedError("the words of the board have changed since they were shown: nothing was loaded")
         before = {name: axis.get(name) for name in axis.names}
         # Where another program may write, or has written, that is said before anything is.
         axis.renew()
         try:
             axis.set(**{**before, **self.words})
             if left := self.differences(axis):
-                raise HostError(f"the board has not taken {', '.join(each.name for each in left)}")
+                raise HostError(f"the board did not take the words {', '.join(each.name for each in left)}")
         except HostError as error:
             raise _undone(axis, before, error) from error
 
@@ -174,12 +176,14 @@ class Config:
 
 
 def _undone(axis: Axis, before: dict[str, float], error: HostError) -> HostError:
-    """Write what a board had before; return an error that says whether it has it."""
+    """Write back the words that the board had before; return an error that says whether this succeeded."""
     with suppress(HostError):
         axis.set(**before)
         if all(axis.get(name) == value for name, value in before.items()):
-            return HostError(f"nothing was loaded, for the board did not take all: {error}")
-    return HostError(f"some words may be loaded and others not, for the board does not answer: load again ({error})")
+            return HostError(f"nothing was loaded, because the board did not take all: {error}")
+    return HostError(
+        f"some words may be loaded and others not, because the board does not answer: load again ({error})"
+    )
 
 
 def _facts(device: Device) -> dict[str, Any]:
@@ -187,7 +191,7 @@ def _facts(device: Device) -> dict[str, Any]:
 
 
 def _nearest(word: Register, value: float) -> float:
-    """Return the SI value with the fewest digits that is the same word; an int of a word that is a plain number."""
+    """Return the SI value of a word with as few digits as give the same word again; an int for a plain number."""
     number = round(value / word.lsb)
     if is_whole(word):
         return number

@@ -1,4 +1,4 @@
-"""The way to a board: open its port, see what it is, and take hold of its axis."""
+"""Connect to a board: open its port, identify it, and take its axis."""
 
 from collections.abc import Callable
 from typing import TypeVar
@@ -16,24 +16,24 @@ Held = TypeVar("Held")
 def connect(
     name: str, baud: int = BAUD, answer_s: float = ANSWER_S, identity: str | None = None, pace: float | None = None
 ) -> Axis:
-    """Return the axis of the board at a port, which no other program can use meanwhile. Nothing moves.
+    """Return the axis of the board at a port. No other program can use the port meanwhile. Nothing moves.
 
-    Of a board of several axes it is the first one: `connect_axes` has them all.
+    If the board has several axes this is the first one; `connect_axes` returns all.
 
     Args:
-        name: a serial port's path, for instance of `/dev/serial/by-id`; or tcp://HOST:PORT.
-        baud: the board's rate.
-        answer_s: the time behind which a board without an answer is silent, in the board's time.
+        name: a serial port, e.g. /dev/ttyUSB0 or a path in /dev/serial/by-id; or tcp://HOST:PORT.
+        baud: the baud rate of the board's line, 1 to `port.BAUD_MAX`.
+        answer_s: a board that does not answer within this time is silent, s of the board's time.
         identity: the identity that the board must have; None for any.
-        pace: of a simulation that is slower than a board, its seconds in a second, or fewer: every wait for it, and the
-            lease of the application, is longer by that. None: what a virtual board on this machine tells, whenever it
-            changes; and 1 of any other.
+        pace: the seconds of a slow simulation in a real second, or fewer, 0.001 to 1. Every wait and the lease of the
+            application are divided by it. None: a virtual board on this machine tells its pace, whenever it changes;
+            any other board has 1.
 
     Raises:
         FieldError: if a number is out of its range.
-        PortError: if the port cannot be had.
+        PortError: if the port cannot be opened.
         SilentError: if nothing answers there.
-        ForeignError: if what answers is no axis that this version knows.
+        ForeignError: if another device answers, or an axis that this version does not know.
         ChangedError: if it has another identity.
     """
     return _held(Axis, Port(name, baud, answer_s, pace), identity)
@@ -42,7 +42,7 @@ def connect(
 def connect_axes(
     name: str, baud: int = BAUD, answer_s: float = ANSWER_S, identity: str | None = None, pace: float | None = None
 ) -> Axes:
-    """Return all axes of the board at a port; of a board of one axis that one. Arguments and errors are `connect`'s."""
+    """Return all axes of the board at a port, also if it has only one. Arguments and errors: see `connect`."""
     return _held(Axes, Port(name, baud, answer_s, pace), identity)
 
 
@@ -54,7 +54,7 @@ def share(
     pace: float | None = None,
     number: int = 0,
 ) -> Relay:
-    """Return what lets many programs have the board at a port, each by `connect(relay.name)`.
+    """Return a relay through which many programs share the board at a port, each by `connect(relay.name)`.
 
     `number` is the port of the loopback, 0 for any that is free. The other arguments and the errors are `connect`'s.
     """
@@ -62,7 +62,7 @@ def share(
 
 
 def _held(hold: Callable[[Port, Device], Held], port: Port, identity: str | None) -> Held:
-    """Return what takes hold of the device at a port, which must have an identity, if one is given."""
+    """Return the axis, axes or relay that `hold` makes of the device at a port; check its identity if one is given."""
     try:
         device = read_device(port)
         if identity not in (None, device.identity):

@@ -1,4 +1,4 @@
-"""What a device says of itself: its identity and its registers, which it carries with it."""
+"""The description that a device carries with it: its identity and its registers."""
 
 import json
 import zlib
@@ -29,7 +29,7 @@ CONSTANT_NAMES = (
     ("clocks_per_sample", SAMPLE_AT, ""),
     ("axes", AXES_AT, ""),
 )
-"""Name, address and unit of every constant, which the map that a device carries does not describe."""
+"""Name, address and unit of every constant; the map in the device does not describe them."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Device:
         registers: every register but the constants, by name.
         capture_registers: registers of its capture memory; 0 without one.
         clocks_per_sample: clocks from a sample to the next.
-        axes: the number of axes; of several, `registers` are those of the first, and each has a bank of such.
+        axes: the number of axes. Each of several axes has a bank of registers; `registers` are the first one's.
     """
 
     identity: str
@@ -85,7 +85,7 @@ def read_device(port: Port) -> Device:
     said = port.identify()
     if said.get(0) != VENDOR:
         raise ForeignError(
-            f"what answers at {port.name} is {said.get(0, b'?').decode(errors='replace')!r}, no hardwall"
+            f"the device at {port.name} is {said.get(0, b'?').decode(errors='replace')!r}, not a hardwall board"
         )
     constants = port.read(CONSTANTS, TELEMETRY - CONSTANTS)
 
@@ -94,8 +94,8 @@ def read_device(port: Port) -> Device:
 
     if constant(LAYOUT_AT) != LAYOUT:
         raise ForeignError(
-            f"the device at {port.name} has the layout {constant(LAYOUT_AT)} of registers, and this version knows "
-            f"{LAYOUT}: take the version of hardwall that its bitstream was made with"
+            f"the device at {port.name} has the register layout {constant(LAYOUT_AT)}; this hardwall knows "
+            f"{LAYOUT}: use the version of hardwall that made its bitstream"
         )
     size = constant(MAP_AT)
     if not 0 < size <= 2 * (SPACE - MAP):
@@ -112,7 +112,7 @@ def read_device(port: Port) -> Device:
 
 
 def _registers(name: str, compressed: bytes, identity: str) -> dict[str, Register]:
-    """Return the registers of a compressed map, which must be that of an identity."""
+    """Return the registers of a compressed map; check that it belongs to the identity."""
     try:
         text = zlib.decompressobj().decompress(compressed, TEXT_MAX)
         described = json.loads(text)

@@ -1,24 +1,24 @@
-"""What may go wrong between a host and a board: every error says in one line what happened and what helps."""
+"""Errors between a host and a board. Every message is one line: what happened, and what to do."""
 
 
 class HostError(RuntimeError):
-    """Something between this program and the board went wrong; the base of all others."""
+    """The base of all errors between this program and the board."""
 
 
 class PortError(HostError):
-    """The port cannot be opened, or is gone."""
+    """The port cannot be opened, or was unplugged."""
 
 
 class SilentError(HostError):
-    """Nothing answers, or no longer."""
+    """The board does not answer, or has stopped answering."""
 
 
 class ForeignError(HostError):
-    """What answers is no axis that this version knows."""
+    """Another device answers, or an axis that this version does not know."""
 
 
 class ChangedError(HostError):
-    """The board is not the one that is expected, or was reset since it was read."""
+    """The board is not the expected one, or was reset since it was read."""
 
 
 class RefusedError(HostError):
@@ -38,11 +38,11 @@ class HeldError(HostError):
 
 
 class LateError(HostError):
-    """What was asked for is too old to be done."""
+    """A request waited too long and is not sent."""
 
 
 class NotReadyError(HostError):
-    """The axis cannot be armed, and why."""
+    """The axis is in a state in which it cannot do this; the message says why."""
 
 
 class TrippedError(HostError):
@@ -50,4 +50,4 @@ class TrippedError(HostError):
 
 
 class ConfigError(ValueError):
-    """A file of a configuration is none, or has a value that its word cannot hold."""
+    """A file is not a configuration, or has a value out of the range of its word."""

@@ -5,7 +5,7 @@ from typing import Protocol
 
 
 class Words(Protocol):
-    """What has words by name."""
+    """An object with words by name."""
 
     def get(self, name: str) -> float:
         """Return the SI value that is used."""
@@ -15,7 +15,8 @@ class Words(Protocol):
 
 
 class Value:
-    """An attribute that is a word of the board: reading it reads what the axis uses, setting it writes and commits.
+    """An attribute that stands for a word of the board: reading it returns the value in use, setting it writes and
+    commits.
 
     Args:
         meaning: what the word is, with its unit.
@@ -35,7 +36,7 @@ class Value:
 
 
 class Named:
-    """What takes no value for an attribute that it has not: a slip of the pen would leave the board as it is.
+    """A group of attributes that refuses unknown names: a misspelt one would silently leave the board unchanged.
 
     It has what its class has or annotates, and whatever begins with an underscore.
     """
@@ -46,7 +47,7 @@ class Named:
         """Set an attribute.
 
         Raises:
-            AttributeError: if there is none of that name; the message has the name that is near it.
+            AttributeError: if there is no attribute of that name; the message suggests a similar one.
         """
         kind = type(self)
         known = {*dir(kind), *kind.__annotations__}
@@ -86,7 +87,7 @@ class Wall(Group):
 
 
 class Supervisor(Group):
-    """What lets a drive out: limits that act at once. Their ranges, and what they are after reset, are the board's."""
+    """The limits of the drive. They act at once. Their ranges, and what they are after reset, are the board's."""
 
     __slots__ = ()
     PREFIX = "supervisor_"

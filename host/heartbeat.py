@@ -1,4 +1,5 @@
-"""The heartbeat: it goes on only while the application shows that it lives, so that one that hangs trips the board."""
+"""The heartbeat. It continues only while the application renews its lease: an application that hangs trips the
+board."""
 
 import threading
 import time
@@ -19,10 +20,10 @@ TRIES = 3
 
 
 class Beat:
-    """One beat: the word of the heartbeat is read, must be that of the last beat, and is written with the next number.
+    """One beat: read the word of the heartbeat, check that it is the last one written, and write the next number.
 
-    So a reset of the board ends the heartbeat, though the words may have been written again since. A beat whose answer
-    is lost is tried again as a whole, so that a reset behind it is found out too. What else is asked waits meanwhile.
+    So a reset of the board ends the heartbeat, though the words may have been written again since. If an answer is lost
+    the whole beat is repeated, so a reset in between is detected too. What else is asked waits meanwhile.
 
     Args:
         port: the line.
@@ -50,7 +51,7 @@ class Beat:
                 last = self._read()
                 if last not in self._numbers:
                     raise ChangedError(
-                        f"the board at {self._port.name} has not the last beat of this program: it was reset, or "
+                        f"the board at {self._port.name} does not have this program's last beat: it was reset, or "
                         "another host writes to it; connect again"
                     )
                 following = last % self._register.high + 1
@@ -84,7 +85,7 @@ class Heartbeat:
         self._thread.start()
 
     def renew(self, lease_s: float) -> None:
-        """Let the heartbeat go on for another lease; if it had ended, a beat is sent before this returns.
+        """Let the heartbeat continue for another lease; if it had stopped, a beat is sent before this returns.
 
         Args:
             lease_s: how long it goes on.

@@ -10,7 +10,7 @@ from .errors import NotReadyError
 from .status import State, Status
 
 INDEX = "the index: move the handle over it"
-"""What homing waits for."""
+"""The event that homing waits for."""
 LOST = "the index was found, but the scale has slipped since: see to the encoder, clear what it says, and home again"
 
 
@@ -22,7 +22,7 @@ class Homed(NamedTuple):
 
 
 class Board(Protocol):
-    """What homing needs of an axis: see `hardwall.host.axis.Axis`."""
+    """The part of `hardwall.host.axis.Axis` that homing needs."""
 
     device: Device
 
@@ -39,7 +39,7 @@ class Board(Protocol):
 
 
 def homing(axis: Board, index_m: float) -> Generator[str, None, Homed]:
-    """Home an axis, a look at it at a step, for who has more to do between two.
+    """Home an axis, one look at it per step, so that a caller can do other things in between.
 
     The handle may move all the time: the board latches the place of the index, and moves its origin at one clock.
 

@@ -1,4 +1,5 @@
-"""Who may write to a board that several programs share: one at a time, and none that does not know what it is now."""
+"""The right to write to a shared board: one program has it at a time, and only if it knows the board's present
+state."""
 
 import os
 import socket
@@ -14,8 +15,8 @@ has written since this one came; and the board did not answer."""
 LEASE_OBJECT, NAMED_OBJECT = 0x80, 4
 """The object of the identification that names the holder of the lease, and the kind of request for one object."""
 HOLD_S = 2.0
-"""The time for which a program that is silent holds the lease: as long as the longest word of the board's watchdog, so
-that no other program is let in while the board may still drive for this one."""
+"""The time after which a silent program loses the lease: the largest value of the board's watchdog. So no other program
+gets the lease while the board may still drive for this one."""
 NAME_MAX = 80
 """The most characters of a program's name."""
 
@@ -80,7 +81,7 @@ def name_of(peer: tuple[str, int], here: tuple[str, int]) -> str:
 
     Args:
         peer: the address and port of that end.
-        here: those of this end.
+        here: the address and port of this end.
     """
     with suppress(OSError, ValueError, IndexError):
         if process := _process_of(peer, here):

@@ -23,25 +23,27 @@ from .requests import PLAIN, Request, Sending
 BAUD, BAUD_MAX = 921_600, 4_000_000
 """The board's rate unless its clock is slow, and the highest of a serial port."""
 ANSWER_S = 1.0
-"""The time behind which a board without an answer is silent; until then, what may be asked twice is asked again."""
+"""The time after which a board without an answer counts as silent. Until then, requests that may be repeated are
+repeated."""
 ANSWER_S_LEAST, ANSWER_S_MOST = 1e-3, 3600.0
 """The limits of that."""
 BYTE_BITS, DEVICE_BITS = 10, 1500
-"""Bits of a byte on the line; and the most bits for which a board thinks: 6000 clocks, and a bit has 4 or more."""
+"""Bits of a byte on the line; and the longest time in which a board prepares an answer, in bits: 6000 clocks of at
+least 4 a bit."""
 BRIDGE_S = 0.016
-"""The time for which a USB bridge keeps what it has received, unless its driver is told otherwise."""
+"""The time in which a USB bridge holds received bytes back, by its driver's default."""
 MACHINE_S = 0.02
-"""The time for which this machine may keep an answer, or a request, while it does something else."""
+"""The longest delay of a request or an answer by this machine's scheduling."""
 BEAT_S = 0.15
-"""The longest time for which other requests wait for a beat of which one request is lost."""
+"""The longest wait of other requests for a beat that loses one of its requests."""
 FIRST_TRIES = 2
-"""Requests that are sent in `answer_s` to a board that has not answered yet, for one may be lost."""
+"""Requests that are sent in `answer_s` to a board that has not answered yet: one may be lost."""
 TRIES = 5
 """Attempts to find the beginning of an answer again."""
 PAUSE_S = 0.025
 """The silence behind which the board takes the next byte for the beginning of a request."""
 EXCEPTIONS = {1: "it does not know the function", 2: "it has no such register", VALUE: "a value is out of its range"}
-"""What an exception of Modbus says of a request, but `FAILURE`."""
+"""The meaning of a Modbus exception, except `FAILURE`."""
 
 
 class Port:
@@ -50,9 +52,9 @@ class Port:
     An answer of Modbus RTU does not say which request it belongs to. So after a request without an answer, and at the
     beginning, the board is asked to repeat a random word until it does: what it had left to say is then over.
 
-    Once it has, an answer is waited for as long as it can take, and no longer, for meanwhile no beat can be sent: the
-    bits of request and answer, `DEVICE_BITS`, `BRIDGE_S` and `MACHINE_S`, which is some 40 ms at 921 600 baud. What may
-    be asked twice is then asked again, until `answer_s` is over.
+    Once the board has answered, an answer is waited for only as long as it can take, because no beat can be sent
+    meanwhile: the bits of request and answer, `DEVICE_BITS`, `BRIDGE_S` and `MACHINE_S`, some 40 ms at 921 600 baud.
+    What may be asked twice is then asked again, until `answer_s` is over.
 
     A port that `hardwall share` serves loses nothing and always answers, though later: it is waited for `answer_s`.
 
@@ -85,7 +87,7 @@ class Port:
         self._in_step, self._gone = False, False
         # Whether other programs have the board, too, behind this port.
         self._shared = False
-        # Whether it has ever been in step; and when something was last sent, of which the board may await the rest.
+        # Whether it has ever been in step; and the time of the last sent bytes, whose rest the board may await.
         self._known, self._sent_s = False, time.monotonic()
         try:
             self._client.connect()
@@ -110,7 +112,7 @@ class Port:
 
     @property
     def pace(self) -> float:
-        """The seconds of the board in a second, or fewer: what was given, or else what it tells now."""
+        """The seconds of the board in a real second, or fewer: as given, or else as the board tells it now."""
         return self._given if self._told is None else self._told.pace
 
     @property
@@ -141,7 +143,7 @@ class Port:
         return tuple(registers)
 
     def first(self) -> AbstractContextManager[None]:
-        """Let the requests of this thread go before those of others, but for what is written at once: for a beat.
+        """Give this thread's requests precedence over all others, except urgent writes. A beat uses it.
 
         An application that reads all the time would part the requests of a beat. Behind a USB bridge the board would
         trip after one lost frame.
@@ -152,7 +154,7 @@ class Port:
         """Write successive registers, all in one request.
 
         Args:
-            address: that of the first.
+            address: the first one's.
             registers: their words.
             sending: how the request goes out.
 
@@ -178,7 +180,7 @@ class Port:
 
     @property
     def lease(self) -> str | None:
-        """The program that holds the lease of a board that is shared, empty if none does; None if it is not shared.
+        """The program that holds the lease of a shared board, empty if none does; None if the board is not shared.
 
         Raises:
             HostError: if nothing answers.
@@ -220,16 +222,16 @@ class Port:
             raise RefusedError(f"the board refuses to {request.what}: {said}", code)
         if not request.fits(answer):
             self._in_step = False
-            raise ForeignError(f"the answer to the request to {request.what} does not fit it")
+            raise ForeignError(f"the answer does not fit the request to {request.what}")
         return answer
 
     def _check_shared(self, request: Request, code: int) -> None:
-        """Raise what an exception of `hardwall share` says, which is none of the board's."""
+        """Raise the error for an exception that comes from `hardwall share`, not from the board."""
         if code == NO_ANSWER:
-            raise SilentError(f"nothing answers behind {self.name} to the request to {request.what}")
+            raise SilentError(f"the board behind {self.name} does not answer the request to {request.what}")
         if code == STALE:
             raise ChangedError(
-                f"another program has written to the board at {self.name} since this one came: connect again"
+                f"another program has written to the board at {self.name} since this program connected: connect again"
             )
         if code == HELD:
             said = self._answer(Request.lease())
@@ -295,11 +297,11 @@ class Port:
                 break
         if self._known:
             # What came may have been late, of requests before.
-            raise SilentError(f"what answers at {self.name} is late, or does not repeat any more what it is told")
-        raise ForeignError(f"what answers at {self.name} does not repeat what it is told, as an axis does")
+            raise SilentError(f"the device at {self.name} answers late, or no longer echoes a test request")
+        raise ForeignError(f"the device at {self.name} does not echo a test request, as an axis does")
 
     def _drain(self, silent_s: float) -> None:
-        """Take what has come, until nothing does for some time; what goes on for too long is no board."""
+        """Read and drop bytes until none comes for some time. If bytes keep coming, the device is no board."""
         until_s = time.monotonic() + self._answer_s
         try:
             while time.monotonic() < until_s:

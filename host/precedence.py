@@ -1,4 +1,5 @@
-"""Whose requests go first: those of a beat. What else is asked waits for its end, but not for ever."""
+"""The order of requests from several threads: a beat goes first. What else is asked waits for its end, but not for
+ever."""
 
 import threading
 from collections.abc import Iterator
@@ -6,7 +7,7 @@ from contextlib import contextmanager
 
 
 class Precedence:
-    """Lets the requests of one thread, which belong together, go before those of all others; one thread at a time."""
+    """Lets a group of requests of one thread go before all other threads' requests; one thread at a time."""
 
     def __init__(self) -> None:
         self._thread: int | None = None

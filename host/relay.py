@@ -16,18 +16,18 @@ from .leases import LEASE_OBJECT, NAMED_OBJECT, NO_ANSWER, Guest, Lease, name_of
 from .port import Port
 
 GUESTS_MAX = 32
-"""The most programs at a board. A further one takes the place of the one that has been silent for longest."""
+"""The most programs at a board. A further program takes the place of the one that has been silent longest."""
 IDLE_S = 1.0
 """The silence behind which a program without the lease may lose its place: `disarm` is to get in."""
 REST_S = 1.0
-"""The time behind which what was begun of a request is dropped: the loopback has no such pauses."""
+"""An incomplete request is dropped after this time: the loopback has no such pauses."""
 GRACE_S, BURST = 5e-3, 5
-"""The time for which the line is kept for the next request of the program that holds the lease, and for how many in a
-row: a beat is two, or four if one is lost, behind another one of its program. Behind a USB bridge a request of another
+"""The waiting time of the line for the lease holder's next request, and how many times in a row. A beat has two
+requests, four if one is lost, and may follow another request of its program. Behind a USB bridge a request of another
 program in between would take 16 ms."""
 DEAF_S, RUBBISH_MAX = 0.1, 16
-"""The time for which a program is not heard after bytes that are no request, and after how many such in a row it is
-left. One that sends nothing else would take the processor from the holder of the lease, whose beats would be late."""
+"""After bytes that are no request, a program is ignored for this time; after so many in a row it is disconnected. A
+program that sends only rubbish would otherwise take processor time from the lease holder and delay its beats."""
 OWN_S = 0.01
 """The time for a request that does not go to the board, one after the other, for the same reason."""
 WRITE_MANY = 16
@@ -47,11 +47,11 @@ class _Program:
 class Relay:
     """Shares a port among programs. A context manager that ends it.
 
-    A request of the program that holds the lease goes before those of all others, and what follows it at once does, up
-    to `BURST` requests. So a beat waits for two requests of others at most, and others are not kept out.
+    A request of the lease holder goes before all others. So do the requests that follow it at once, up to `BURST`. So a
+    beat waits for two requests of others at most, and others are not kept out.
 
-    What any program may do at any time is read, and disarm. Nothing is sent that no program has asked for: the board's
-    heartbeat is that of the program that holds the lease, and ends with it.
+    What any program may do at any time is read, and disarm. The relay sends nothing of its own. The board's heartbeat
+    comes from the program that holds the lease, and stops with it.
 
     Args:
         port: the board's port, which is closed at the end.
@@ -73,7 +73,7 @@ class Relay:
         try:
             self._listener = socket.create_server((LOOPBACK, number))
         except OSError as error:
-            raise PortError(f"port {number} of {LOOPBACK} cannot be had: {error.strerror}") from None
+            raise PortError(f"port {number} of {LOOPBACK} cannot be opened: {error.strerror}") from None
         self.name = f"{NETWORK}{LOOPBACK}:{self._listener.getsockname()[1]}"
         self.failure: HostError | None = None
         # Whose turn it is: one request at a time, the holder's first; and how many wait, of the holder and of others.
@@ -205,7 +205,7 @@ class Relay:
                 self._turns.notify_all()
 
     def _own_answer(self, request: bytes) -> bytes | None:
-        """Return the answer to a request that does not go to the board; None to one that does."""
+        """Return the relay's own answer to a request; None if the request goes to the board."""
         function, data = request[1], request[2:]
         if function == DIAGNOSE and data[:2] == ECHO.to_bytes(2, "big"):
             return request
@@ -218,7 +218,7 @@ class Relay:
         """Wait, with the lock, until a request of the holder, or of another program, may go out."""
         self._waiting[holds] += 1
         while not self._may_go(holds):
-            # The end of a request wakes all; the time for which the line is kept ends by itself.
+            # The end of a request wakes all; the line's waiting time ends by itself.
             self._turns.wait(GRACE_S)
         self._waiting[holds] -= 1
 
@@ -231,13 +231,13 @@ class Relay:
         return enough or not (self._waiting[True] or time.monotonic() < self._kept_s)
 
     def _refusal(self, guest: Guest, request: bytes) -> int | None:
-        """Return the exception that answers a request that is not carried to the board; None for one that is."""
+        """Return the exception with which a request is refused; None if it is passed to the board."""
         if request[1] not in WRITES or self._disarms_alone(request):
             return None
         return self._lease.refusal(guest)
 
     def _disarms_alone(self, request: bytes) -> bool:
-        """Return whether all that a request writes is the pulse that disarms an axis."""
+        """Return whether a request writes only the pulse that disarms an axis."""
         place, count = (int.from_bytes(request[at : at + 2], "big") for at in (2, 4))
         if request[1] not in (WRITE_ONE, WRITE_MANY):
             return False
@@ -245,7 +245,7 @@ class Relay:
 
 
 def _send_away(program: _Program) -> None:
-    """End a program's connection; the thread that serves it sees that, and closes it."""
+    """End a program's connection; the thread that serves it then closes it."""
     with suppress(OSError):
         program.connection.shutdown(socket.SHUT_RDWR)
 

@@ -1,4 +1,4 @@
-"""What is asked of a board over its line: the bytes of request and answer, how it is sent, and what fits it."""
+"""Requests to a board over its line: their bytes, their answers, and the check that an answer fits."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -38,7 +38,7 @@ class Relayed(NamedTuple):
     frame: bytes
 
     def isError(self) -> bool:
-        """Whether it must be shown as an error: never, for it is another program's to judge."""
+        """Whether it must be shown as an error: never, because another program must judge it."""
         return False
 
 
@@ -117,7 +117,7 @@ def _relayed(client: Any, request: bytes) -> Relayed:
     while not _is_whole(answer):
         came = client.recv(None)
         if not came or len(answer) > FRAME_MAX:
-            raise ModbusIOException("no answer that is whole")
+            raise ModbusIOException("an incomplete answer")
         answer += came
     return Relayed(answer[:-2])
 

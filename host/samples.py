@@ -1,4 +1,4 @@
-"""Samples of an axis at a stated rate, for as long as is wanted: what is missed is counted where it is missed."""
+"""Samples of an axis at a given rate, for any time. A missed sample is counted where it is missing."""
 
 import heapq
 import math
@@ -13,18 +13,18 @@ from .errors import SilentError
 from .status import Status
 
 RATE_HZ, RATE_LEAST_HZ, RATE_MOST_HZ = 20.0, 1e-3, 1e3
-"""The rate unless another one is given, and its limits. A board is read some hundreds of times a second."""
+"""The default rate and its limits, Hz. A board can be read some hundreds of times a second."""
 GAPS = 5
 """The gaps that are remembered, the longest ones."""
 COLUMNS = (
     *("time_s", "unix_s", "stamp_s", "state", "position_m", "velocity_m_per_s", "wall_force_n", "force_n"),
     *("live", "ready", "referenced", "a_channel_idle", "flags", "causes", "missed"),
 )
-"""What a row of a sample has."""
+"""The columns of a sample's row."""
 
 
 class Board(Protocol):
-    """What samples need of an axis: see `hardwall.host.axis.Axis`."""
+    """The part of `hardwall.host.axis.Axis` that samples need."""
 
     @property
     def status(self) -> Status: ...
@@ -37,7 +37,8 @@ class Sample(NamedTuple):
         time_s: when it was asked for, s since the first one, by a clock of this computer that never jumps.
         unix_s: the same moment, s since 1970 began, UTC.
         status: what the axis did; None if the board did not answer.
-        missed: the samples that are missing between the one before and this one; this one, too, if it has no status.
+        missed: the number of samples missing between the one before and this one, including this one if it has no
+            status.
     """
 
     time_s: float
@@ -47,7 +48,7 @@ class Sample(NamedTuple):
 
     @property
     def row(self) -> dict[str, Any]:
-        """The values by `COLUMNS`, as JSON takes them; those of a status that is None are None."""
+        """The values by `COLUMNS`, as JSON takes them. Without a status its values are None."""
         row = dict.fromkeys(COLUMNS) | {"time_s": round(self.time_s, 6), "unix_s": round(self.unix_s, 6)}
         if status := self.status:
             row |= {name: getattr(status, name) for name in COLUMNS if hasattr(status, name)}
@@ -57,7 +58,7 @@ class Sample(NamedTuple):
 
 
 class Gap(NamedTuple):
-    """Samples that follow each other and are missing: how many, and the time of the first, s since the first sample."""
+    """A run of missing samples: how many, and the time of the first one, s since the first sample."""
 
     missed: int
     time_s: float
@@ -67,21 +68,21 @@ class Samples(Iterator[Sample]):
     """Samples of an axis. They are due at whole multiples of the period.
 
     A sample is missed if the next one is due before the board could be asked for it, or if the board did not answer.
-    Every sample that is due is either yielded with a status, or counted in `missed` of the next one that is yielded.
+    Every due sample is either yielded with a status, or counted in `missed` of the next one yielded.
 
-    Nothing is written, so that no lease is renewed: a program that has armed calls `axis.renew()` in its loop.
+    Nothing is written, so no lease is renewed: a program that has armed must call `axis.renew()` in its loop.
 
     Args:
         axis: the axis.
         rate_hz: samples a second.
-        seconds: the time for which samples are due; None: for ever.
+        seconds: the time in which samples are due, s; None: for ever.
 
     Attributes:
         rate_hz: as given.
         taken: how many were yielded with a status; missed: how many are missing.
 
     Raises:
-        TypeError: if a number is none.
+        TypeError: if an argument is not a number.
         FieldError: if the rate is not 0.001 Hz to 1 kHz, or the time not finite, or negative.
         HostError: as the next sample is taken, if the port is gone. A board without an answer is no error.
     """
@@ -125,7 +126,7 @@ class Samples(Iterator[Sample]):
         return Sample(time_s, unix_s, status, missed)
 
     def _count(self, missed: int, from_s: float, answered: bool) -> None:
-        """Count what is missing from a time on, before a sample that ends the gap if it was answered."""
+        """Count the samples missing from a time on; an answered sample ends the gap."""
         self.taken += answered
         self.missed += missed
         if missed:
@@ -143,7 +144,7 @@ class Samples(Iterator[Sample]):
         return sorted(heapq.nlargest(GAPS, gaps), key=lambda gap: gap.time_s)
 
     def __str__(self) -> str:
-        """What was taken and what was missed, and when, in a line."""
+        """The numbers of samples taken and missed, and the times of the gaps, in one line."""
         said = f"{self.taken} samples at {self.rate_hz:g} Hz, {self.missed} missed"
         gaps = self.gaps
         if not gaps:

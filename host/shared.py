@@ -1,4 +1,4 @@
-"""What several axes on one board have in common: one heartbeat, and the words that there are once."""
+"""The state that several axes on one board share: the heartbeat, and the words that exist once."""
 
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
@@ -15,8 +15,8 @@ class Leased(Protocol):
 
 
 class Shared(NamedTuple):
-    """What several axes on one board have in common: who beats, the words that there are once, as last written, and
-    the axes themselves."""
+    """The state that several axes on one board share: the heartbeat, the last written values of words that exist once,
+    and the axes."""
 
     beat: Beat
     words: dict[str, int]

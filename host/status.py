@@ -1,4 +1,4 @@
-"""What a board shows: the state of its axis, and why it tripped."""
+"""The status of a board: the state of its axis, and the causes of a trip."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -22,7 +22,7 @@ class Trip:
 
     Attributes:
         latched: the word of the causes.
-        causes: their names; first: the names of those that led to the last trip.
+        causes: the names of the latched causes; first: the names of the causes of the last trip.
         counts: how often every cause has come since the board's reset, at most 15, by name.
     """
 
@@ -40,7 +40,7 @@ class Trip:
 
 @dataclass(frozen=True)
 class Status:
-    """What an axis does, all values of one clock but the causes, which are of at most 1000 clocks later.
+    """The status of an axis. All values are of one clock, except the causes: they are read at most 1000 clocks later.
 
     Attributes:
         state: the state of the supervisor.
@@ -70,7 +70,8 @@ class Status:
 
 
 def status_of(words: dict[str, int], si: dict[str, float], flag_bits: int) -> Status:
-    """Return the status of the words of registers and their SI values, both by name; `flag_bits` is that of `flags`."""
+    """Return the status from the words of registers and their SI values, both by name; `flag_bits` is the number of
+    bits of `flags`."""
     return Status(
         State(words["state"]),
         si["count"],

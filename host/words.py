@@ -1,4 +1,4 @@
-"""The words of a board in SI units: what was written, and one request for all that takes effect together."""
+"""The words of a board in SI units. Words that take effect together go out in one request."""
 
 import difflib
 from collections.abc import Callable, Collection, Mapping
@@ -19,12 +19,12 @@ OF_THE_HEARTBEAT = ("heartbeat", "acknowledged")
 
 
 class Words:
-    """The words of a board, and an image of what was written to them, which is read from the board at first.
+    """The words of a board, and an image of their written values, which is first read from the board.
 
     Args:
         port: the line.
         device: the device there.
-        once: of several axes what was written last of the words that there are once, by name; they all share it.
+        once: the last written values of the words that exist once, by name; all axes of the board share it.
         check: called when a request to write goes out; what it raises is raised, and nothing is written.
 
     Raises:
@@ -64,9 +64,8 @@ class Words:
             last = self._last(name)
             if word not in (last, self._tried.get(name, last)):
                 raise ChangedError(
-                    f"the board at {self._port.name} has {self._si(name, word):g} in {name}, and not "
-                    f"{self._si(name, last):g} as it was written: it was reset, or another host "
-                    "writes to it; connect again"
+                    f"the board at {self._port.name} has {self._si(name, word):g} in {name} instead of "
+                    f"the written {self._si(name, last):g}: it was reset, or another host writes to it; connect again"
                 )
         self._written, self._tried = found, {}
 
@@ -96,8 +95,8 @@ class Words:
         Raises:
             FieldError: if there is no such word, or a value is out of its range.
             TypeError: if a value is no number.
-            ChangedError: if a request before had no answer, and the board has neither the words of before it nor those
-                of after it.
+            ChangedError: if an earlier request had no answer, and the board has neither the words from before it nor
+                from after it.
             HostError: if the board does not answer, or refuses. What had no answer may have been carried out: `get`
                 says what is used.
         """
@@ -112,7 +111,7 @@ class Words:
             self._commit({name: given[name] for name in committed})
 
     def _runs(self, names: Collection[str]) -> list[list[Register]]:
-        """Return live words as runs of which a request each is enough: those whose addresses follow each other.
+        """Return live words grouped into runs of successive addresses: one request writes a run.
 
         What there is once for several axes is elsewhere than the words around it.
         """

@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 LARGEST = (1 << 62) - 1
 """The largest count or clock; the least is -LARGEST - 1. Sums and differences of two such values fit int64."""
 NUMBERS = 1e-30, 1e30
-"""The least and the largest number of a specification, in units that the user may choose: far beyond any use, and such
-that no power or ratio of the numbers leaves the range of float64."""
+"""The least and the largest number of a specification, in units that the user may choose. They are far beyond any use;
+no power or ratio of such numbers leaves the range of float64."""
 SHOWN_MAX = 60
 """The most characters of a value in a message."""
 

@@ -32,6 +32,6 @@ def width_of(step: int) -> int | None:
 
 
 def cure(step: int) -> str:
-    """Return what to say of a step that may be a wrap, as the end of a message; empty for none."""
+    """Return the end of a message on a step that may be a wrap; empty for none."""
     bits = width_of(step)
     return f"; if the counter wraps, give count_bits={bits}" if bits else ""

@@ -1,7 +1,7 @@
 """The times of an encoder's edges: since the first, in samples and in clocks.
 
-Times are numbers of float64, which are rounded: a time that is k / rate is a little off. `unsure_s` is by how much: two
-units in the last place of the largest time. A time that is so little behind a sample, or behind a clock, is at it.
+Times are float64 and rounded: a time of k / rate is slightly off. `unsure_s` is by how much: two units in the last
+place of the largest time. A time that is so little behind a sample, or behind a clock, is at it.
 """
 
 import numpy as np
@@ -50,7 +50,7 @@ def since_first(times_s: ArrayLike, counts: np.ndarray) -> tuple[np.ndarray, flo
 
 
 def samples_of(since_s: np.ndarray, counts: np.ndarray, sample_hz: float, unsure_s: float) -> np.ndarray:
-    """Return the counts at the samples, from that of the start to the last before or at the last edge.
+    """Return the counts at the samples, from the start to the last sample before or at the last edge.
 
     Raises:
         ValueError: if there is no sample after the start, or there are more than `SAMPLES_MAX`.

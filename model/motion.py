@@ -2,14 +2,15 @@
 
 A bound that is not given comes from the counts:
 
-- travel: the span of the counts, rounded up to a power of two, at most that of a 32-bit count;
+- travel: the span of the counts, rounded up to a power of two, at most the span of a 32-bit count;
 - speed: the largest change in a sample and one count more, rounded up to a power of two;
-- acceleration: the largest second difference over T samples, |c(k + T) - 2 c(k) + c(k - T)| / T^2, with the shortest
-  T of 1, 2, 4, ... in which it reaches `ENOUGH` counts. The counts are rounded, which is worth at most two counts of
-  such a difference: so the bound is at most ENOUGH / (ENOUGH - 2) of the largest acceleration, and no less than
-  (ENOUGH - 2) / ENOUGH of the largest mean over T. If none reaches it, the largest that is certain: two counts less.
+- acceleration: the largest second difference over T samples, |c(k + T) - 2 c(k) + c(k - T)| / T^2. T is the shortest of
+  1, 2, 4, ... at which the difference reaches `ENOUGH` counts. Rounded counts add an error of at most two counts. So
+  the bound is at most ENOUGH / (ENOUGH - 2) times the largest acceleration, and at least (ENOUGH - 2) / ENOUGH times
+  the largest mean over T. If no T reaches `ENOUGH`, the bound is the largest difference less two counts: so much is
+  certain.
 
-Who designs hardware gives the bounds: an axis does not know its future.
+For hardware, give the bounds: an axis does not know its future motion.
 """
 
 from dataclasses import dataclass, fields
@@ -37,7 +38,8 @@ class Motion:
         count: size of one x4 count.
         acceleration_max: bound on the acceleration, unit/s^2; sets default gains.
         speed_max: largest speed, unit/s.
-        travel: length of the travel, unit. The count wraps at four times of it either way, which is no fault.
+        travel: length of the travel, unit. The count wraps at four times this length in either direction, without a
+            fault.
         jerk_max: bound on the jerk between impacts, unit/s^3; None for one that follows from the acceleration. It sets
             default gains of `edge-kalman` and of the Levants of order 2 and 3.
         edge_error: RMS error of single edges, counts; sets default gains of `edge-kalman`.
@@ -64,13 +66,13 @@ class Motion:
     def of(
         cls, counts: np.ndarray, sample_hz: float, count: float = 1.0, **given: Any
     ) -> tuple[Self, dict[str, float]]:
-        """Return the bounds of a record, and those of them that are not given and come from the counts, by name.
+        """Return the bounds of a record; and, by name, the bounds taken from the counts.
 
         Args:
             counts: integers, shape (..., samples) with two samples or more; one set of bounds for all lanes.
             sample_hz: sample rate, Hz.
             count: size of one count.
-            given: bounds by name; None is as if it were not given.
+            given: bounds by name; None counts as not given.
 
         Raises:
             TypeError: if a bound is not a number, or the counts are not integers.

@@ -18,7 +18,7 @@ GLITCH_CLOCKS = 0
 DECODER_CLOCKS = quadrature.latency(GLITCH_CLOCKS)
 """The latency of the decoder: an edge this many clocks before a strobe is the last that is counted at it."""
 CLOCKS, CLOCKS_A_SECOND = 1 << 16, 1 << 36
-"""The clocks of a sample and of a second with which a design is tried first, of which it takes the fewer."""
+"""The clocks of a sample and of a second for the first trial of a design, which takes the fewer."""
 STEP_MAX = 2.0**24
 """The largest bound on the speed, counts a sample."""
 

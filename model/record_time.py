@@ -1,9 +1,9 @@
 """The time of a record: an axis for samples at any rate, whole or not.
 
-An `AxisSpec` has a whole number of samples a second. The axis of a record has a second of its own, so that the same
-hardware serves any rate: a number of sample periods, the least power of two that is a true second or longer, and
-`SECOND` at least. Lengths stay in the unit of the record. A quantity of the unit 1/s^p is, in that second,
-(second / sample_hz)**p times what it is in a true one.
+An `AxisSpec` has a whole number of samples a second. The axis of a record has its own second, so that the same hardware
+serves any rate. That second is a number of sample periods: the least power of two that is a true second or longer, and
+at least `SECOND`. Lengths stay in the unit of the record. In that second, a quantity of the unit 1/s^p is (second /
+sample_hz)**p times its value in true seconds.
 
 The clock stamps of edges wrap after that second or more. So edges that are further apart read as standstill, as they do
 in hardware after a true second.
@@ -43,7 +43,7 @@ def power_of_name(name: str) -> float:
 
 @dataclass(frozen=True)
 class RecordTime:
-    """True seconds against those of a record's axis.
+    """True seconds, and the seconds of a record's axis.
 
     Attributes:
         sample_hz: the record's sample rate in true seconds, within `RATES`.
@@ -66,7 +66,7 @@ class RecordTime:
 
     @property
     def said(self) -> str:
-        """What a message on the axis has to say of its second."""
+        """The words of a message on the axis about its second."""
         return f"as if {self.second} samples were a second"
 
     def to_axis(self, value: float, power: float) -> float:

@@ -18,14 +18,15 @@ from .stamped import run
 from .velocity_estimator import VelocityEstimator, check_of_counts, is_floating, output_of
 
 CLOCK_HZ, CLOCKS = 100e6, 1 << 16
-"""The clock that stamps edges is at least so fast, but for what it has in a sample beyond so many clocks."""
+"""The lowest rate of the stamping clock, Hz, unless a sample would then have more clocks than this number."""
 CLOCK_RANGE = 1e-6, 2.0**48
 BOUNDS = "speed_max", "travel", "jerk_max", "edge_error"
 """The bounds of a motion that are settings."""
 
 
 class RecordWarning(UserWarning):
-    """Something that a velocity depends on beyond the arguments: bounds from the record, or a flag that was raised."""
+    """A velocity depends on more than the arguments: on bounds taken from the record, or on a value that raised a
+    flag."""
 
 
 def velocity(
@@ -48,24 +49,25 @@ def velocity(
 
     Args:
         counts: integers, shape (..., samples), with two samples or more along `axis`; other axes are lanes of one
-            motion, which have the same bounds.
+            motion, with the same bounds.
         sample_hz: sample rate, Hz, `record_time.RATES`; it need not be whole.
         estimator: name of an estimator that needs only counts: see `estimators.registry`.
         count: size of a count; the result is in its unit per second. 1 gives counts/s.
-        acceleration_max: bound on the acceleration, unit/s^2, from which default gains follow. None: from the record.
+        acceleration_max: bound on the acceleration, unit/s^2, from which default gains follow. None: taken from the
+            record.
         output: the estimator's output; None for its first.
         backend: `fixed` for the hardware's words, `float` for the same algorithm in float64 with unrounded gains.
         axis: the axis of time.
-        settings: further bounds (`speed_max`, unit/s; `travel`, unit; see `motion.Motion`); `count_bits`, the width of
-            a counter that wraps; the estimator's `gains`; and run-time words by name, in seconds and the unit of
-            `count`. A word may be an array: it is broadcast against the other axes, a value a lane.
+        settings: further bounds (`speed_max`, unit/s; `travel`, unit; see `motion.Motion`). `count_bits`: the width of
+            a counter that wraps. `gains`: the estimator's gains. Others are run-time words by name, in seconds and the
+            unit of `count`. A word may be an array with a value for each lane: it is broadcast against the other axes.
 
     Returns:
-        float64, the shape of the counts; where words are arrays, the shape to which both broadcast.
+        float64 in the shape of the counts; if words are arrays, in the shape to which both broadcast.
 
     Warns:
-        RecordWarning: with the bounds that come from the record, for they make a velocity depend on later counts; and
-            if a flag was raised.
+        RecordWarning: if bounds come from the record, because a velocity then depends on later counts too; and if a
+            flag was raised. The message gives the bounds.
 
     Raises:
         TypeError: if an argument is of the wrong type.
@@ -100,20 +102,21 @@ def velocity_of_edges(
     backend: str = "fixed",
     **settings: Any,
 ) -> np.ndarray:
-    """Return the velocity at a rate of its own, from an encoder's edges and their times, as the hardware estimates it.
+    """Return the velocity at `sample_hz` from the times of an encoder's edges, as the hardware estimates it.
 
-    Edges that are more than a second apart, and more than 1024 samples, may read as standstill, as in hardware.
+    If two edges are more than a second and more than 1024 samples apart, the velocity may read 0 between them, as in
+    hardware.
 
     Args:
-        times_s: s, shape (edges,), increasing: the start of the record, and the time of every edge. Integers and
-            `datetime64` keep the resolution that float64 does not have far from 0; integers are seconds, too.
+        times_s: s, shape (edges,), increasing: the start of the record, and the time of every edge. Integers (whole
+            seconds) and `datetime64` keep a resolution that float64 loses far from 0.
         counts: integers of the same shape: the count at the start, and after every edge. An edge changes it by 1.
         sample_hz: rate of the velocities, Hz; at most `edge_times.SAMPLES_MAX` samples.
-        estimator: name of an estimator, by stamps of edges or not: see `estimators.registry`.
+        estimator: name of an estimator, see `estimators.registry`; one that needs edges or one that needs only counts.
         count, acceleration_max, output, backend: as of `velocity`.
         settings: as of `velocity`, but words are numbers. `clock_hz`: the least rate of the clock that stamps edges,
-            Hz; None for one that tells the closest edges apart and is 100 MHz, or has 65 536 clocks a sample if that is
-            slower.
+            Hz. None: 100 MHz, or 65 536 clocks a sample if that is slower, but fast enough to tell the closest edges
+            apart.
 
     Returns:
         float64, shape (samples,): the velocity at times_s[0] + k / sample_hz, from k = 1 to the last edge. An edge at
@@ -139,7 +142,7 @@ def velocity_of_edges(
     words = time.words(word for word in design.words if word.name != design.output_word())
     axis = Axis(spec, floating, **time.settings(words, settings), **design.choose(output))
     clocks = clocks_of(since, sample_hz * spec.clocks_per_sample, unsure_s)
-    # The count at a strobe is that of DECODER_CLOCKS before it; the record starts at the strobe of sample 0.
+    # The count at a strobe is the count DECODER_CLOCKS before it. The record starts at the strobe of sample 0.
     first = timing.strobe - DECODER_CLOCKS
     record = run(axis, first + clocks[1:], level(array[1:] - array[0]), len(sampled), int(level(0)))
     _tell(found, spec.design.flag_names(int(record.flags[-1])))
@@ -150,7 +153,7 @@ def velocity_of_edges(
 def _motion(
     counts: np.ndarray, sample_hz: float, count: float, acceleration_max: float | None, settings: dict[str, Any]
 ) -> tuple[Motion, dict[str, float]]:
-    """Return the bounds for a record, taken out of the settings or from the counts, and the latter by name."""
+    """Return the bounds of a record, from the settings or else from the counts; and by name those from the counts."""
     RecordTime(sample_hz)
     given = {name: settings.pop(name, None) for name in BOUNDS}
     return Motion.of(counts, sample_hz, count, acceleration_max=acceleration_max, **given)
@@ -160,7 +163,7 @@ def _tell(found: dict[str, float], flags: list[str], hint: str = "") -> None:
     """Warn the caller's caller of bounds that come from the record, and of flags."""
     if found:
         said = ", ".join(f"{name}={value:.6g}" for name, value in found.items())
-        warnings.warn(f"{said}: from the record, because not given{hint}", RecordWarning, stacklevel=3)
+        warnings.warn(f"{said}: taken from the record, because not given{hint}", RecordWarning, stacklevel=3)
     if flags:
         cures = "; a larger speed_max may help" if "velocity_saturated" in flags else ""
         warnings.warn(f"raised flags: {', '.join(flags)}{cures}{hint}", RecordWarning, stacklevel=3)

@@ -21,7 +21,7 @@ def narrowed(signed: SQ) -> SQ:
 
 
 class Kind(Enum):
-    """What a register is to the host; the value is the kind's name in texts."""
+    """The kind of a register for the host; the value is the kind's name in texts."""
 
     CONSTANT = "constant"
     STATUS = "status"

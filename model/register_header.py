@@ -17,7 +17,7 @@ from .register import COUNTER_BITS, VALUE_BITS, Register
 from .register_texts import c_header
 
 END = "#endif\n"
-"""What closes the guard of a header."""
+"""The end of a header's guard."""
 NAMES = """\
 /* Three names of a register NAME:
  *
@@ -45,7 +45,7 @@ def offset_of(register: Register) -> int:
 
 
 def _fields(registers: RegisterMap) -> Iterator[str]:
-    """Yield what C needs of the fields inside words: shifts of the bits that have masks, and fields of several bits."""
+    """Yield the C lines for fields inside words: shifts of the masked bits, and fields of several bits."""
     for kind, names in (
         ("CAUSE", [cause.name for cause in CAUSES]),
         ("FLAG", registers.spec.design.flags),
@@ -88,7 +88,7 @@ def header(registers: RegisterMap) -> str:
     """Return the header `registers.h` of a map, for C99 and C++."""
     names, text = NAMES, c_header(registers)
     if isinstance(registers, AxesMap):
-        # The constant `axes` is a register, whose address has the name that the number of axes has here.
+        # The constant `axes` is a register; its address has the name that the number of axes has here.
         number = f"{registers.banks}\n"
         names, text = NAMES_OF_AXES, text.replace(f"#define HARDWALL_AXES {number}", f"#define HARDWALL_BANKS {number}")
     lines = [

@@ -43,7 +43,7 @@ def _window(capture: Design) -> str:
 
 
 def _of_status(registers: RegisterMap) -> str:
-    """Return what is said of values that a frame reads together, and of banks if there are several."""
+    """Return the text on values that a frame reads together, and on banks if there are several."""
     if isinstance(registers, AxesMap):
         once = ", ".join(f"`{each.name}`" for each in registers.shared)
         return (

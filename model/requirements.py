@@ -6,16 +6,17 @@ Units inside the axis are counts and sample periods, so with q the count size an
     stiffness   1 force LSB per count        = r / q            N/m      (r: the force LSB)
     damping     1 force LSB per count/sample = r tau / q        N s/m
 
-Counts. Positions and the wall may lie anywhere in the travel whatever the origin (twice the travel), and an overshoot
-as large again must not alias: the count covers plus and minus four times the travel, halved on each side, which is
+Counts. Positions and the wall may lie anywhere in the travel, whatever the origin: this takes twice the travel. An
+overshoot as large again must not alias. So the count covers plus and minus four times the travel, halved on each side:
 `1 + ceil(log2(4 travel / q))` bits with the sign. An edge beyond an end of that range wraps the count and raises a
-flag. Differences of two counts of the handle are taken modulo the width. The wall's depth is not: it has a bit more.
+flag. Differences of two counts of the handle are taken modulo the width. The wall's depth is not taken modulo the
+width: it has a bit more.
 
-Force. The force LSB is `force_resolution_n`; `force` is the format between wall and output stage, with one bit more
-than the largest drive needs, so that a saturated wall force is always beyond the limit that the output stage applies.
+Force. The force LSB is `force_resolution_n`. `force` is the format between wall and output stage. It has one bit more
+than the largest drive needs, so a saturated wall force is always above the limit of the output stage.
 
-Gain words are unsigned and `words.GAIN_BITS` wide; a gain's format has the fewest integer bits that hold its largest
-value, so that it resolves largest / 2**GAIN_BITS or better.
+Gain words are unsigned and `words.GAIN_BITS` wide. A gain's format has the fewest integer bits that hold its largest
+value. So its resolution is largest / 2**GAIN_BITS or finer.
 """
 
 import dataclasses
@@ -27,13 +28,13 @@ from .checks import NUMBERS, FieldError, check_int, check_number, check_range, s
 from .encoder.quadrature_speed import GLITCH_CLOCKS_MAX, glitch_clocks_for
 
 CLOCK_HZ_MAX = 1 << 48
-"""The largest clock, far beyond any: stamps, of as many bits, are computed in 64."""
+"""The largest clock, Hz, far above any FPGA's: it keeps stamps short enough for arithmetic in 64 bits."""
 RATES_HZ = 1, 10**9
-"""The least and the largest rate of an axis in true seconds, of a recording too."""
+"""The least and the largest sample rate of an axis or a recording, Hz."""
 EDGE_ERROR_COUNTS = 0.1
-"""The RMS error of single edges that is borne unless another is given: that of a poor scale."""
+"""The default RMS error of single edges, counts: a poor scale's."""
 JERK_SHARE = 2.0**-7
-"""The jerk that is expected unless it is given, of C in the time in which C moves half a count."""
+"""The default bound on the jerk, as a share of C divided by the time in which C moves half a count."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,8 +59,8 @@ class AxisRequirements:
         damping_max_n_s_per_m: largest wall damping, N s/m.
         glitch_clocks: the encoder's glitch filter after reset, clocks; None for the longest that its speed leaves
             (`quadrature_speed.glitch_clocks_for`).
-        estimator_bits_dropped: number of fraction bits removed from the derived widths of the estimator's words, to
-            study what a bit is worth.
+        estimator_bits_dropped: number of fraction bits removed from the derived widths of the estimator's words, 0 to
+            32; for studies of the word width.
 
     Raises:
         TypeError: if a field is of the wrong type.
@@ -151,7 +152,8 @@ class AxisRequirements:
 
     @property
     def stamp_width(self) -> int:
-        """Bits of a clock stamp, which wraps after a second or more: edges below about 2 Hz read as standstill."""
+        """Bits of a clock stamp. It wraps after a second or more, so edges slower than about 2 Hz read as
+        standstill."""
         return bits_for(self.clock_hz)
 
     @property

@@ -1,13 +1,13 @@
 """An axis a sample at a time: the position of a handle in, the force out, for loops of one's own.
 
-Between two samples the position moves evenly. Its edges go to the pins of the hardware's decoder at their clocks: so
-estimators that time edges work, and the decoder's latency and its faults are those of the hardware. In a sample of D
-clocks from t0 on, from x0 to x1, the edge at the border b comes at
+Between two samples the position moves at constant speed. Its edges reach the pins of the hardware's decoder at their
+own clocks. So estimators that time edges work, and latency and faults are the hardware's. In a sample of D clocks from
+t0 on, from position x0 to x1, the edge at the border b comes at
 
     t = t0 + 1 + floor(D (b - x0) / (x1 - x0)),      one edge a clock, the last not after t0 + D
 
-What passes more edges than a sample has clocks is beyond any decoder: both pins then change at once, which is the flag
-`encoder_illegal`, and no force from there on.
+A motion with more edges than clocks in a sample is too fast for any decoder. Both pins then change at once. This raises
+the flag `encoder_illegal`, and the force is 0 until `reset`.
 """
 
 import math
@@ -30,7 +30,7 @@ from .stamped import State, controller, sample_quietly
 from .velocity_estimator import is_floating
 
 REACH = 2.0**52
-"""The largest position in counts, either way: of a larger one, the cell is not known."""
+"""The largest position in either direction, counts: float64 cannot tell the cell of a larger one."""
 
 
 @compiled
@@ -41,7 +41,7 @@ def cell_of(position, count_m):
 
 @inlined
 def turned(controller, state, clock, pins):
-    """Return the state with the decoder advanced to `clock`, from which the pins have another level; no sample."""
+    """Return the state with the decoder advanced to `clock`, at which the pins change to `pins`; no sample is taken."""
     inputs = Inputs(state.level & 1, state.level >> 1, 0, controller.glitch_clocks, controller.invert)
     decoder = advance(controller.decoder, state.decoder, inputs, clock - state.clock)
     return State(state.drive, state.velocity, state.force, state.flags, decoder, state.axis, clock, pins)
@@ -125,12 +125,12 @@ class Sampler:
         while True:
             force_n = sampler(position_m)       # every 1 / spec.sample_hz seconds
 
-    The first position is where the axis is reset: it sets the count, and there is no velocity yet. The count is the
-    position over the size of a count, rounded down: to give a count n, pass (n + 0.5) count_m. An edge within the
-    decoder's latency before a sample counts at the next one. The force is that of the last change of the drive, at
-    `spec.actuation_hz`; in hardware it changes `spec.design.latency_to_drive` clocks after the sample.
+    The first position is the one at reset: it sets the count, and the velocity is 0. The count is the position divided
+    by the size of a count, rounded down; for a count n, pass (n + 0.5) count_m. An edge within the decoder's latency
+    before a sample counts at the next sample. The force changes at `spec.actuation_hz`. In hardware it changes
+    `spec.design.latency_to_drive` clocks after the sample.
 
-    The first call compiles, for some seconds. `copy.deepcopy` and `pickle` keep the state.
+    The first call compiles the kernels, which takes some seconds. `copy.deepcopy` and `pickle` keep the state.
 
     Args:
         spec: the axis.
@@ -164,7 +164,7 @@ class Sampler:
             self._keep(*held["held"])
 
     def reset(self) -> None:
-        """Begin anew: the next position is the first, and flags are down. Run-time words stay."""
+        """Start again: the next position is the first one, and no flag is up. Run-time words stay."""
         self._kept = None
 
     def set(self, **si: float) -> None:

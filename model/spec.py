@@ -1,4 +1,4 @@
-"""One axis, specified: its requirements, the estimator that it has, and the design that follows from both."""
+"""The specification of one axis: its requirements and its estimator. The design follows from both."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,9 +16,9 @@ class AxisSpec(DesignedAxis):
     """The requirements of one axis and its estimator; the RTL, the model and the host's conversions are built from it.
 
     Attributes:
-        stage: what makes pins of the drive, a `Stage` of one of `drive.registry`.
+        stage: the drive stage, a `Stage` from `drive.registry`, which turns the drive word into pins.
 
-    The other attributes are those of `designed.DesignedAxis`, and the errors those of `requirements.AxisRequirements`.
+    The other attributes are in `designed.DesignedAxis`, the errors in `requirements.AxisRequirements`.
     """
 
     stage: Stage = USUAL
@@ -43,7 +43,7 @@ class AxisSpec(DesignedAxis):
 
     @property
     def facts(self) -> dict[str, Any]:
-        """Every field by name, with the gains that are in use; without the stage if that is the usual one."""
+        """Every field by name, with the gains in use; the stage is left out if it is the usual one."""
         facts = super().facts
         if self.stage == USUAL:
             del facts["stage"]

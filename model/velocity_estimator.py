@@ -61,17 +61,17 @@ def check_of_counts(estimator: str) -> None:
 
 
 class VelocityEstimator:
-    """An estimator with its state: counts in, velocities out, a record in as many pieces as one likes.
+    """An estimator with its state: counts in, velocities out. A record may come in any number of pieces.
 
         estimator = VelocityEstimator(10e3, "kalman", Motion(count=1e-6, acceleration_max=12, speed_max=2, travel=0.15))
         first, second = estimator(counts[:500]), estimator(counts[500:])
 
-    `copy.deepcopy` and `pickle` keep the state, to go on from it twice, or elsewhere.
+    `copy.deepcopy` and `pickle` keep the state: use them to continue twice from one point, or in another process.
 
     Args:
         sample_hz: sample rate, Hz; it need not be whole.
         estimator: name of an estimator that needs only counts: see `estimators.registry`.
-        motion: the bounds of the motion; formats and default gains follow from it.
+        motion: the bounds of the motion; word formats and default gains follow from them.
         output: the estimator's output; None for its first.
         backend: `fixed` for the hardware's words, `float` for the same algorithm in float64 with unrounded gains.
         gains: the estimator's `Gains` in seconds and the motion's unit; None for its default ones.
@@ -79,8 +79,8 @@ class VelocityEstimator:
         settings: run-time words by name, as of `set`.
 
     Attributes:
-        spec: the axis that the estimator is of; its second is that of `record_time`.
-        words: the run-time words that may be set, by name, with their ranges in true seconds.
+        spec: the axis to which the estimator belongs; its unit of time is explained in `record_time`.
+        words: the run-time words by name, with their ranges in seconds.
 
     Raises:
         TypeError: if an argument is of the wrong type.
@@ -129,8 +129,8 @@ class VelocityEstimator:
         """Change run-time words from the next count on, as a host does while the hardware runs.
 
         Args:
-            settings: values by the name of their word, in seconds and the motion's unit. An array is broadcast against
-                the lanes of the counts, the shape without the axis of time: a value a lane.
+            settings: values by the name of their word, in seconds and the motion's unit. An array has a value for each
+                lane: it is broadcast against the shape of the counts without the axis of time.
 
         Raises:
             TypeError: if a value is not a number.
@@ -146,20 +146,20 @@ class VelocityEstimator:
 
     @property
     def flags(self) -> list[str]:
-        """The names of the flags that were raised in any lane since the start: words that saturated."""
+        """The names of the flags raised in any lane since the start; a flag tells which word saturated."""
         return [name for bit, name in enumerate(self._design.flags) if self._flags >> bit & 1]
 
     def __call__(self, counts: ArrayLike, axis: int = -1) -> np.ndarray:
         """Return the velocities at further counts, in the motion's unit per second, as float64.
 
         Args:
-            counts: integers; along `axis` they follow one another, and the other axes are independent lanes. A count
-                may have any origin. From one to the next it changes by less than half of the range that follows from
-                the motion's travel, eight times as long.
+            counts: integers; along `axis` they follow one another, and the other axes are independent lanes. The origin
+                of a count is free. From one count to the next the change is less than half of the count's range, which
+                is eight times the motion's travel.
             axis: the axis of time.
 
         Returns:
-            An array of the shape of the counts; where settings are arrays, of the shape to which both broadcast.
+            An array in the shape of the counts; if settings are arrays, in the shape to which both broadcast.
 
         Raises:
             TypeError: if the counts are not integers.

@@ -100,5 +100,5 @@ class Word:
 
 
 def ranges_of(words: Iterable[Word]) -> dict[str, tuple[int, int]]:
-    """Return the least and the largest of those words that may not have every value of their formats, by name."""
+    """Return the least and the largest value of the words whose range is smaller than their format's, by name."""
     return {word.name: (word.low, word.high) for word in words if (word.least, word.most) != (None, None)}

@@ -83,6 +83,16 @@ def test_the_estimators_that_a_report_names_are_its_sources():
     assert {"butterworth", "tracking_loop"} <= {path.stem for path in reports.sources_of("zwidth")}
 
 
+def test_what_only_people_read_is_no_part_of_an_origin():
+    first, same, other = (
+        f"def f(x: Annotated[int, Option(help={text!r}, min={least})]):\n"
+        f"    if x > {least}:\n        raise ValueError(f'{text}, not {{x}}') from None\n    return x\n"
+        for text, least in (("the length", 1), ("how long it is", 1), ("the length", 2))
+    )
+    code = [reports._read(source.encode(), "hardwall")[0] for source in (first, same, other)]
+    assert code[0] == code[1] != code[2]
+
+
 def test_what_only_shows_is_no_source_and_the_hardware_only_of_what_runs_it():
     sources = reports.sources_of("accuracy --rates 1e3")
     assert {path.relative_to(ROOT).parts[0] for path in sources} == {"cli", "model", "sim"}

@@ -75,7 +75,7 @@ class Divisionless(wiring.Component):
         check_int("term_width", term_width, 1)
         self._fraction = fraction
         self._digits, self._digit = model.digits(quotient_width + 1)
-        # Bits of the quotient before the point, with those of the digits that it does not use.
+        # Bits of the quotient before the point, including unused bits of its digits.
         self._whole = self._digits * self._digit - fraction - 1
         narrow, wide = max(model.FINE + 1, factor_width), max(divisor_width + self._whole + 1, term_width)
         super().__init__(
@@ -155,7 +155,7 @@ class Divisionless(wiring.Component):
                 m.next = f"SHIFT_{each + 1}" if each + 1 < passes else "LOOK"
 
     def _take_dividend(self, m: Module, s: SimpleNamespace) -> None:
-        """Take the shifted dividend; what is above its place is a quotient that does not fit."""
+        """Take the shifted dividend; bits above its place mean a quotient that does not fit."""
         m.d.sync += [s.x.eq(self.product), s.over.eq(s.over | self.product[len(s.x) :].any())]
 
     def _invert(self, m: Module, s: SimpleNamespace) -> None:
@@ -182,7 +182,7 @@ class Divisionless(wiring.Component):
             m.next = "LOAD"
 
     def _correct(self, m: Module, s: SimpleNamespace) -> None:
-        """Add the states that make the digits, each from the top of what the ones before it leave."""
+        """Add the states that make the digits, each from the top of the remainder so far."""
         point, digit = len(s.remainder) - 1, self._digit
         loading, last = Signal(), Signal()
         leading = s.remainder[point - digit :]
@@ -193,7 +193,7 @@ class Divisionless(wiring.Component):
             m.d.sync += s.remainder.eq(following)
             m.next = "DIGIT"
         with m.State("DIGIT"):
-            # The last digit counts one more, so that the top bit of what is left says whether the quotient does.
+            # The last digit counts one more, so that the top bit of the remainder says whether the quotient does.
             m.d.comb += [s.narrow.eq(leading + last), s.wide.eq(s.t)]
             m.d.sync += s.made.eq(Cat(leading[:digit], s.made + leading[digit]))
             m.next = "CORRECT"

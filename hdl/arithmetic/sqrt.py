@@ -78,7 +78,7 @@ class Sqrt(wiring.Component):
         m = Module()
         clocks = model.digits(self._width)
         # The radicand moves, four bits a clock, from its top into a remainder that is at most twice the root so far.
-        # The root is kept as its complement, which is what a subtraction adds, and as three times that, plus one.
+        # The root is kept as its complement, which a subtraction adds, and as three times the complement plus one.
         digits = Signal(4 * clocks)
         remainder = Signal(2 * clocks + 1)
         complement = Signal(signed(len(self.root) + 1), init=-1)

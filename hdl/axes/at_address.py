@@ -1,4 +1,4 @@
-"""What there is at the address of a host of several axes, and which pulses an axis refuses there."""
+"""The register at a host's address on a board of several axes, and the pulses that the axis refuses there."""
 
 from typing import NamedTuple
 
@@ -15,12 +15,12 @@ from ..wires import names_of
 
 
 class At(NamedTuple):
-    """What there is at the host's address.
+    """The register at the host's address.
 
     Attributes:
         place, bank: its lowest bits, and the bank, which may be none.
         in_banks, in_map, in_capture: whether it is a register of a bank, of the window, of the capture memory.
-        is_pulse, is_status: it is that of a pulse, or a status.
+        is_pulse, is_status: the register is a pulse, or a status.
         wide: it is one of two of a value.
         half: a frame begins or ends with it, and has half of a value.
     """
@@ -37,7 +37,7 @@ class At(NamedTuple):
 
 
 class Axes(NamedTuple):
-    """The axes of an operation: at the address, the one that a frame writes to, and the one whose status it reads.
+    """The axes of an operation: at the address, written by the frame, and read in its status.
 
     Attributes:
         here, to, asked: their numbers.
@@ -79,7 +79,7 @@ def at_address(m: Module, file: Component, depth: int) -> At:
 
 
 def refused(m: Module, file: Component, wanted: Value, asking: Value) -> Value:
-    """Return whether a pulse that is wanted of an axis is refused, after what its last turn has shown.
+    """Return whether the axis refuses the wanted pulse, by the outputs of its last turn.
 
     Args:
         m: the module.

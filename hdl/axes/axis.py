@@ -30,8 +30,8 @@ class Axes(wiring.Component):
 
     In a rota of `spec.clocks_per_sample` clocks, beginning with the first one after a reset, clock i takes the count of
     axis i; `latency` clocks later its drive has changed. Every axis equals a `hardwall.hdl.axis.axis.Axis` with its
-    words, sample for sample. An input of one bit for each axis has that of axis i in bit i; an output that is an
-    array has the word of axis i as element i.
+    words, sample for sample. Bit i of an input with one bit for each axis belongs to axis i. Element i of an output
+    array is the word of axis i.
 
     Parameters at run time: while `word_ready`, a clock with `word_write` puts `word_value` into the shadow of word
     `word_number` of axis `word_axis`; words are numbered as in `spec.design.words`. A pulse of an axis's `commit` makes
@@ -39,10 +39,10 @@ class Axes(wiring.Component):
     keeps its words. After a reset every word, and its shadow, has its reset value (the wall is off); `word_ready` is
     low during the first rota, and what is written then is lost.
 
-    Faults: as of a single axis, for each axis alone. After an illegal transition, or if the encoder is too fast for the
-    decoder, the drive of the axis is zero from its next sample on until `clear_flags`. `drive_enable` low makes its
-    drive zero at the next clock; it stays zero until `drive_enable` has been high from the force to the drive of a
-    sample of an actuation. A sample raises `flags` with its drive.
+    Faults: as of a single axis, for each axis alone. After an illegal transition, or at a speed beyond the decoder, the
+    axis's drive is zero from its next sample on until `clear_flags`. `drive_enable` low makes its drive zero at the
+    next clock; it stays zero until `drive_enable` has been high from the force to the drive of a sample of an
+    actuation. A sample raises `flags` with its drive.
 
     Latency: `latency` clocks from a strobe to the changed drive, more than a rota if that is short; the decoder's
     latency from a pin to the strobe. Throughput: a sample of one axis or another every clock.
@@ -80,8 +80,7 @@ class Axes(wiring.Component):
     stepped, edge_down : Out(axes), edge_kind : Out(array), indexed : Out(axes)
         High for one clock with the count of a new edge; whether the last edge counted -1, and its kind; high for one
         clock with the count at an index.
-    strobe, strobe_axis : Out
-        High in a clock in which an axis is sampled, and which one.
+    strobe, strobe_axis : Out High in a clock in which an axis is sampled; and the number of this axis.
     estimated : Out(axes), velocity, saturated, estimated_count : Out
         High for one clock with a sample's velocity; the velocity, whether the estimator is saturated, and the count.
     illegal, overspeed, wrapped : Out(axes), illegal_count : Out(array)
@@ -207,7 +206,8 @@ class Axes(wiring.Component):
         return m
 
     def _words(self, pipe: Pipe, first: Value):
-        """Add shadow and words in use but those of the encoders; return the word of the axis in a stage, by its name.
+        """Add the shadow and the words in use, except the encoders'; return a function: the word of the axis in a
+        stage, by name.
 
         The words of a sample are read at its strobe, all at once, and go along with it.
         """

@@ -25,8 +25,8 @@ class AxesBoard(wiring.Component):
     """Supervised axes behind their pins: `SupervisedAxes`, their link, a capture memory and a stage of pulses for each.
 
     A host reads and writes the registers of `registers`, a bank for each axis; what it asks of an axis in one frame
-    happens at one clock. It is refused an `arm` of an axis that is not `ready`, and a `preload` or an `origin_shift` of
-    one that is ARMED.
+    happens at one clock. An `arm` is refused if the axis is not `ready`, and a `preload` or an `origin_shift` if it is
+    ARMED.
 
     One set of loops serves all axes: `drive_enable`, `emergency_stop` and `external_fault`, which an axis takes part in
     as its `supervisor_causes` says. Encoders have no complements here: each is taken to be unlike its channel, so
@@ -39,11 +39,11 @@ class AxesBoard(wiring.Component):
     `Board`. Until both clocks run and the reset has ended, `outputs_enable` is low.
 
     Latency: at most `latency` clocks from an axis's strobe to pulses that follow the changed drive. `drive_enable` or
-    `emergency_stop` low makes every pulse low at once, through a gate that needs no clock; a loop of `external_fault`
-    that opens makes them so `safe_latency` clock edges later; any other cause after the axis's turn: see
+    `emergency_stop` low makes every pulse low at once, through a gate that needs no clock. An open loop of
+    `external_fault` makes them low `safe_latency` clock edges later. Any other cause does so after the axis's turn: see
     `SupervisedAxes`.
 
-    Rounding and overflow: those of the stage.
+    Rounding and overflow: as of the stage.
 
     Reset: as of `Board`.
 
@@ -60,8 +60,7 @@ class AxesBoard(wiring.Component):
     -------
     clk, rst, oscillator : In(1)
         As of `Board`.
-    encoder_a, encoder_b, encoder_z : In(axes)
-        Asynchronous pins, those of axis i in bit i.
+    encoder_a, encoder_b, encoder_z : In(axes) Asynchronous pins; bit i belongs to axis i.
     drive_enable, external_fault, emergency_stop : In(1)
         Loops of all axes: high is closed; asynchronous pins, which must read low when nothing is connected.
     uart_rx, uart_tx : In(1) and Out(1)
@@ -121,7 +120,7 @@ class AxesBoard(wiring.Component):
 
     @property
     def safe_latency(self) -> int:
-        """Clock edges from the first that sees the loop of a fault open to the one that makes the pulses low."""
+        """Clock edges from the first that sees the fault loop open until the pulses are low."""
         return self.axes.loop_latency + self.stages[0].design.safe_latency
 
     def elaborate(self, platform):
@@ -133,7 +132,7 @@ class AxesBoard(wiring.Component):
         m.d.comb += lead_out(axes, self, ENCODER)
         m.d.comb += axes.slip.eq(stood.replicate(self.spec.axes))
         m.d.comb += lead_out(link, self, link.PINS)
-        # A channel without a complement is unlike what stands for that, whatever the clock edge sees.
+        # A channel without a complement differs from its stand-in, whatever the clock edge sees.
         m.d.comb += [axes.encoder_a_n.eq(~axes.encoder_a), axes.encoder_b_n.eq(~axes.encoder_b)]
         m.d.comb += given(axes, {name: loop.replicate(self.spec.axes) for name, loop in loops.items()})
         parts = {False: ports(axes)}

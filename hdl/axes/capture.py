@@ -19,11 +19,11 @@ OUTPUTS = "capture_state", "capture_place", "capture_stamp"
 
 
 class AxesCapture(Block):
-    """A `Capture` for all axes, which takes one of them at a time, and what joins it to `SupervisedAxes`.
+    """A `Capture` for all axes, one of them at a time, and its connection to `SupervisedAxes`.
 
     Equation: the model's, word for word. A `capture_start` takes the axis that `capture_axis` names then; until the
-    next start the word has no effect. A record in the memory has the values of one sample of that axis: those of its
-    record, and the state and the drive of its turn.
+    next start the word has no effect. A record in the memory has the values of one sample of that axis: its record's,
+    and the state and the drive of its turn.
 
     Latency: the memory hears of a sample `SAMPLED` clocks behind its record, and of the host's pulses `PULSED` clocks
     behind them; `capture_data` is the register at `capture_address` one clock later.
@@ -45,8 +45,7 @@ class AxesCapture(Block):
         Pulses: begin a capture, and trigger it by hand.
     one input for each word of `design.words` : In
         Run-time parameters, which act at the next clock.
-    capture_address : In
-        A register of the window, whose first one is that of the oldest record.
+    capture_address : In A register of the window, which begins with the oldest record.
     capture_data : Out(16)
         The register that `capture_address` had a clock before, if the capture was done then.
     capture_done : Out(1)
@@ -97,7 +96,7 @@ class AxesCapture(Block):
         with m.If(self.capture_start):
             m.d.sync += axis.eq(self.capture_axis)
 
-        # What the record and the turn of a sample show is kept until those of the next.
+        # The record and the turn of a sample are kept until the next sample's.
         recorded = self.record_valid & (self.record_axis == axis)
         velocity = self.record_velocity >> len(self.record_velocity) - len(memory.velocity)
         seen = {"count": self.record_count, "velocity": velocity, "wall_force": self.record_wall_force}

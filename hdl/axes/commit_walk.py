@@ -1,4 +1,4 @@
-"""The walk of the register file of several axes through the cells of a bank, and what it counts beside that."""
+"""The walk of the register file of several axes through the cells of a bank, and its counters."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
 

@@ -1,4 +1,4 @@
-"""What enters the pipeline of an estimator, and what leaves it."""
+"""The inputs and the outputs of an estimator's pipeline."""
 
 from collections.abc import Callable
 from typing import NamedTuple

@@ -65,7 +65,7 @@ def _corrected(value: Value, product: Value, shift: int, negative: Value, positi
 
 
 def _root(pipe: Pipe, radicand: Value, stage: int) -> tuple[Value, int]:
-    """Return floor(sqrt(radicand)), of a radicand in that stage, and the stage in which the root is ready."""
+    """Return floor(sqrt(radicand)) of the radicand in that stage, and the stage in which the root is ready."""
     bits = (len(radicand) + 1) // 2
     digits = Cat(radicand, C(0, 2 * bits - len(radicand)))
     remainder, root = C(0, 0), C(0, 0)

@@ -11,7 +11,7 @@ from .pipe import Pipe
 
 
 class Writing(NamedTuple):
-    """What the host writes in this clock: the axis, the number of a word and the word, and whether it does."""
+    """The host's write in this clock: the axis, the number of a word, the word, and whether there is a write."""
 
     axis: Value
     number: Value
@@ -20,7 +20,7 @@ class Writing(NamedTuple):
 
 
 class LiveWords:
-    """The live words of every axis, each in a memory of its own, for it is written alone.
+    """The live words of every axis, each in its own memory, because it is written alone.
 
     Args:
         pipe: the pipeline; in its first rota after a reset every axis takes its reset words in stage 0.
@@ -51,7 +51,7 @@ class LiveWords:
         self._taken[word.name] = stage + 1, taken.as_signed() if word.format.signed else taken
 
     def __call__(self, name: str, stage: int) -> Value:
-        """Return the word of the axis that is in a stage, which comes after the one in which it was taken."""
+        """Return the word of the axis in a stage; this stage comes after the one that took the word."""
         since, taken = self._taken[name]
         return self._pipe.later(taken, stage - since)
 

@@ -46,7 +46,7 @@ class Sample(NamedTuple):
 
 
 class Looked(NamedTuple):
-    """What the look of a turn shows of the encoder since the last turn, a stage later.
+    """The encoder's events since the last turn, as a turn's look shows them, a stage later.
 
     Attributes:
         stage: that stage.

@@ -12,7 +12,7 @@ from .pipe import Pipe
 
 
 class Driven(NamedTuple):
-    """What a sample makes of its axis's drive, 3 stages after its force.
+    """The drive that follows from a sample, 3 stages after its force.
 
     Attributes:
         drive: the drive, if the axis was enabled since its force came.
@@ -48,7 +48,7 @@ def drive(pipe: Pipe, design: Design, forced: Forced, enable: Value, word: Calla
     for number, (mine, turn) in enumerate(zip(dropped, pipe.turns(stage), strict=True)):
         pipe.m.d.sync += mine.eq(~enable[number] | (mine & ~turn))
 
-    # The stage works with magnitudes, and keeps that of the force as its complement, which a comparison adds. The
+    # The stage works with magnitudes. It keeps the force's magnitude as its complement, which a comparison adds. The
     # growth is measured from the drive, or from zero if the force has the other sign.
     negative = forced.force[-1]
     magnitude = Signal(range(most + 1))

@@ -8,10 +8,10 @@ from .supervisor import Judged
 
 
 class Doors:
-    """A door for every axis. It is shut from the clock in which a loop is open until a turn has looked at that.
+    """A door for every axis. It is shut from the clock in which a loop is open until a turn has seen this.
 
-    A turn that has looked lets out nothing, for it finds an enable that was low or a cause that stands. Turns that had
-    looked before may still decide to let something out: none of them comes later than the next look.
+    Such a turn lets out nothing: it finds a low enable or a standing cause. Turns that had looked before may still
+    decide to let something out: none of them comes later than the next look.
 
     Args:
         pipe: the pipeline.
@@ -44,7 +44,7 @@ class Doors:
         self.drive_inverted = Signal(pipe.axes)
 
     def let_out(self, judged: Judged, wave: Value, invert: Value, stage: int) -> None:
-        """Let out what a turn decides, in that stage.
+        """Let out the drive that a turn allows, in that stage.
 
         Args:
             judged: what it decides.

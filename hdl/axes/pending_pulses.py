@@ -1,4 +1,4 @@
-"""What an axis's decoder, pins and host did since its last sample, and since the last look of a turn."""
+"""Events of an axis's decoder, pins and host since its last sample, and since the last look of a turn."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from .pipe import Pipe
 
 
 class Asked(NamedTuple):
-    """What the host asks for: pulses, a bit for each axis, and the causes that it has read, with `acknowledge`."""
+    """The host's requests: pulses, a bit for each axis; and with `acknowledge` the causes that it has read."""
 
     arm: Value
     disarm: Value
@@ -25,7 +25,7 @@ def turned(m: Module, written: Signal, pending: Value) -> Value:
     Args:
         m: the module.
         written: for every axis its encoder_invert, as the host has written it last.
-        pending: for every axis whether its words wait for its strobe, which takes what is written until then.
+        pending: for every axis, whether its words wait for its strobe; the strobe takes everything written until then.
     """
     inverted = Signal.like(written, name="inverted")
     m.d.sync += inverted.eq((pending & written) | (~pending & inverted))
@@ -33,7 +33,7 @@ def turned(m: Module, written: Signal, pending: Value) -> Value:
 
 
 def encoders(pipe: Pipe, axes: Axes, levels: Mapping[str, Value], look: int) -> dict[str, Signal]:
-    """Return what encoders did since the last look in that stage, by name, a bit for each axis."""
+    """Return the encoders' events since the last look in that stage, by name, a bit for each axis."""
     kinds = Cat(kind[0] for kind in axes.edge_kind)
     pulses = {
         "encoder_illegal": axes.illegal,
@@ -48,16 +48,16 @@ def encoders(pipe: Pipe, axes: Axes, levels: Mapping[str, Value], look: int) -> 
 
 
 def looked_at(pipe: Pipe, waiting: Mapping[str, Value], asked: Asked, look: int) -> dict[str, Value]:
-    """Return what waits for the axis that is in the stage of the look, by name, a stage later.
+    """Return the waiting events of the axis in the stage of the look, by name, a stage later.
 
     Args:
         pipe: the pipeline.
         waiting: what waits, by name, a bit for each axis.
-        asked: what the host asks for, which waits too.
+        asked: the host's requests, which wait too.
         look: the stage.
     """
     m = pipe.m
-    # One mask serves all axes: a later acknowledgement makes void those that wait.
+    # One mask serves all axes: a later acknowledgement replaces the waiting ones.
     acknowledges, acknowledged = Signal(pipe.axes), Signal.like(asked.acknowledged, name="acknowledged_last")
     m.d.sync += acknowledges.eq(acknowledges & ~Cat(pipe.turns(look)))
     with m.If(asked.acknowledge.any()):

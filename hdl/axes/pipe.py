@@ -1,4 +1,4 @@
-"""What the stages of a pipeline of axes share: registers, delays, and a word kept for every axis from pass to pass.
+"""The common parts of a pipeline's stages: registers, delays, and a word kept for every axis from pass to pass.
 
 A pass is one sample of one axis on its way through the pipeline. It is in stage s during the s-th clock after its
 strobe, which is stage 0; a register loaded in stage s is seen in stage s + 1.
@@ -63,7 +63,7 @@ class Pipe:
         Args:
             name: what waits.
             pulses: a bit for every axis.
-            stage: the stage in which what waits is looked at.
+            stage: the stage that looks at the waiting events.
         """
         waiting = Signal(self.axes, name=f"waiting_{name}")
         self.m.d.sync += waiting.eq(pulses | (waiting & ~Cat(self.turns(stage))))
@@ -106,7 +106,7 @@ class Pipe:
 
 
 class Kept:
-    """A word for every axis, which one stage writes and another reads, in a memory that is read within the clock."""
+    """A word for every axis: one stage writes it, another reads it. The memory is read within the clock."""
 
     def __init__(self, pipe: Pipe, name: str, shape: Shape | int):
         self._pipe = pipe

@@ -1,4 +1,4 @@
-"""The cells of the register file of several axes, and the register through which all goes that they give and take."""
+"""The cells of the register file of several axes, and the shift register through which they are read and written."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib.memory import Memory
@@ -24,7 +24,7 @@ class Cells:
         cell, write: the ports of the banks.
         text: the port of what never changes.
         area, window: what `text` is asked for: an area, and whether it is in the window.
-        shift, upper: what a cell has or gets; and what `shift` had before.
+        shift, upper: the content of a cell, old or new; and the content of `shift` before.
         moments: when the status of an axis is taken.
         taking: by name, whether `shift` takes a cell, a text, a status, or the host's value.
     """
@@ -45,12 +45,12 @@ class Cells:
         self.taking: dict[str, Signal] = {}
 
     def take(self, m: Module, file: Component, asked: Signal) -> None:
-        """Let `shift` take what it is told to, of the file's host and inputs; the status is that of the axis asked."""
+        """Load `shift` as told, from the file's host and inputs; a status comes from the axis asked."""
         host = file.host
         status = held_status(m, file, asked, self.moments)
         takes = {"value": host.value, "status": status}
         if file.design.registers.capture:
-            # That memory is large, and far away: what it gives has a register of its own first.
+            # That memory is large and far away: its output has its own register first.
             takes["capture"] = arrived = Signal(CELL_BITS)
             m.d.comb += file.capture_address.eq(host.address)
             m.d.sync += arrived.eq(file.capture_data & file.capture_done.replicate(CELL_BITS))
@@ -62,7 +62,7 @@ class Cells:
                 m.d.sync += [self.shift.eq(takes[name]), self.upper.eq(self.shift)]
 
     def address(self, m: Module, address: Value, place: Value, bank: Value) -> None:
-        """Ask the memories for what is at an address, which has a place in a bank."""
+        """Read the memories at an address that has a place in a bank."""
         upper = Mux(self.window, address[len(place) : self._within], self.area)
         m.d.comb += [
             self.text.addr.eq(Cat(place, upper, self.window)),

@@ -42,26 +42,26 @@ class BankedFile(wiring.Component):
 
     - CHECK_READ, CHECK_WRITE: raise `absent`, `outside` or `refused` if the register cannot be read, or written with
       `host.value`, or not now. The halves of a value are checked in the order of their addresses, one after the other.
-      `arm` is refused unless the last turn of its axis was `ready`, `preload` and `origin_shift` if it was ARMED, and
-      a pulse beside one of `EXCLUSIVE` since `clear`; the capture memory, unless it is done. A CHECK_READ of a status
-      lets the next SNAPSHOT take that axis's.
-    - READ: give the register; of a status, in whichever bank, that of the last snapshot.
+      `arm` is refused unless the last turn of its axis was `ready`. `preload` and `origin_shift` are refused if the
+      axis was ARMED. A pulse is refused beside one of `EXCLUSIVE` since `clear`. The capture memory is refused unless
+      it is done. A CHECK_READ of a status lets the next SNAPSHOT take that axis's.
+    - READ: give the register; a status of any bank comes from the last snapshot.
     - WRITE: keep the value of a word, or of a counter; mark a pulse if the value is 1. A live word goes to its axis
       with its lower half, which is written after the upper one. Only what was checked is written.
     - COUNT: add 1 to a counter, which wraps.
     - FINISH: if `commit` is marked, copy every written word of the bank of the last WRITE to its active one, and write
       it to that axis. Then all marked pulses are high for one clock, the same one, with `preload_count` and
-      `acknowledged`, which stay. `done` comes when every axis has had an actuation and a turn since: so what is read
-      back as active is in use, what is read of a status is of a sample behind the pulses, what is refused is known, the
-      drive of a moved count is that of its new place, and no acknowledgement takes another one's place.
+      `acknowledged`, which stay. `done` comes when every axis has had an actuation and a turn since. So words that are
+      read back as active are in use. A status read then is of a sample after the pulses. Refusals are known. The drive
+      of a moved count belongs to its new place. No acknowledgement takes another one's place.
     - SNAPSHOT: take the status of the axis that CHECK_READ was asked for, if any: all of one sample, the next one, with
-      the stamp of the clock of its record. The stamps of edges are those of the last edges in that sample's count, each
-      0 until there was one: they are remembered here, for every axis.
+      the stamp of the clock of its record. The stamps of the last edges in that sample's count are remembered here for
+      every axis, each 0 until there is one.
 
     Latency, in clocks from the first of `start` to `done`: 1 for CHECK_READ; 2 for READ, 3 of the capture memory; 3 for
-    WRITE and COUNT; 4 for CHECK_WRITE; for SNAPSHOT 1, or 1 more than it takes until the axis's next strobe, the record
-    of that sample and the turn behind that; for FINISH 1, or `finish_clocks` if anything is marked. After a reset the
-    first `start` may come at once; it waits for `boot_clocks`, and for `word_ready`.
+    WRITE and COUNT; 4 for CHECK_WRITE. SNAPSHOT takes 1, or 1 more than the time until the axis's next strobe, the
+    record of that sample and the turn behind it. FINISH takes 1, or `finish_clocks` if anything is marked. After a
+    reset the first `start` may come at once; it waits for `boot_clocks`, and for `word_ready`.
 
     Rounding and overflow: a value of fewer bits than its registers is extended by its sign or by zeros; one of more
     bits, a velocity, gives its upper ones.
@@ -301,7 +301,7 @@ class BankedFile(wiring.Component):
     def _give_pulses(self, m: Module, axes: Axes, pulses: Pulses, walk: CommitWalk) -> None:
         """Add the states that give the pulses, and wait until they have acted."""
         with m.State("PULSE"):
-            # One of all axes has a single bit, which is that of the only bank that it is written to in.
+            # A pulse for all axes has a single bit: the bit of the only bank in which it is written.
             for bit, name in enumerate(pulses.names):
                 m.d.sync += port(self, name).eq(Mux(pulses.marks[bit], Const(1) << axes.to, 0))
             m.d.sync += [pulses.marks.eq(0), walk.settling.eq(self._design.settle_clocks)]

@@ -1,4 +1,4 @@
-"""Several axes that may touch motors: the axes, and monitors and supervisors that take turns as they do."""
+"""Several axes that may drive motors: the axes, with monitors and supervisors that take turns as the axes do."""
 
 from amaranth.hdl import Cat, Const, Module, Signal, Value
 from amaranth.lib import wiring
@@ -27,36 +27,36 @@ from .supervisor import Judged, Supervisors, Turn
 REQUESTS = "arm", "disarm", "acknowledge"
 """Pulses of the host that wait for an axis's turn."""
 HIDDEN = "drive", "sampled", "actuated"
-"""Outputs of the axes that do not leave: the drive that nobody has let out, and what says when it changed."""
+"""Internal outputs of the axes: the drive before its supervisor, and the signal of its change."""
 
 
 class SupervisedAxes(wiring.Component):
     """Axes from encoder pins to drives that are let out: `Axes`, and `Monitors` and `Supervisors` in the same rota.
 
-    Every axis has a supervisor of its own, which promises what `hardwall.hdl.axis.supervisor.Supervisor` does. It acts
-    in the axis's turn, once a sample: what pins, host and decoder did since the last turn waits for it, and so do
-    pulses of the host. A turn looks `LOOK` clocks before the sample's drive is there, and decides a clock after that,
-    with the monitors' causes of that very sample: the drive of a sample that is wrong is never let out.
+    Every axis has its own supervisor, with the promises of `hardwall.hdl.axis.supervisor.Supervisor`. It acts in the
+    axis's turn, once a sample: what pins, host and decoder did since the last turn waits for it, and so do pulses of
+    the host. A turn looks `LOOK` clocks before the sample's drive is there. It decides a clock after the drive, with
+    the monitors' causes of that very sample. So the drive of a faulty sample is never let out.
 
-    Between the turns, zero is as near as for a single axis: a loop that opens makes the drive zero at the third clock
-    edge, and it stays zero until the turn, which no longer finds the axis ARMED. The loop of `external_fault` does so
-    where `supervisor_causes` has its bit, as the host wrote it last.
+    Between the turns, zero is as near as for a single axis. A loop that opens makes the drive zero at the third clock
+    edge. It stays zero until the turn, which then finds the axis not ARMED. The loop of `external_fault` does so where
+    `supervisor_causes` has its bit, as the host wrote it last.
 
-    An input of one bit for each axis has that of axis i in bit i; an output that is an array has the word of axis i as
-    element i.
+    Bit i of an input with one bit for each axis belongs to axis i. Element i of an output array is the word of axis i.
 
-    Parameters at run time are written as in `Axes`, by the numbers of `design.words`. Those of `spec.design.words`
-    wait for a `commit`; the others act in the axis's next turn, so a lower force limit holds with its drive.
+    Parameters at run time are written as in `Axes`, by the numbers of `design.words`. The words of `spec.design.words`
+    wait for a `commit`. The others act in the axis's next turn, so a lower force limit holds with its drive.
     `output_force_limit` cannot be written. A commit of another `encoder_invert` is a `disarm` and a `slip`. A turn that
-    finds a cause of `SLIPS`, which the axis watches, is a `slip` too. The heartbeat and its watchdog are those of the
-    one host, for all axes; a word of the watchdog beyond its range is the cause word_range of each. Both, and the
-    ranges of the words, are looked at in the turn alone: what lasts for less than a rota is missed.
+    finds a watched cause of `SLIPS` is a `slip`, too. All axes share the host's heartbeat and its watchdog. A word of
+    the watchdog beyond its range is the cause word_range of every axis. Both, and the ranges of the words, are looked
+    at in the turn alone: what lasts for less than a rota is missed.
 
-    Causes: those of `hardwall.model.axis.supervisor`, as `hardwall.model.axes.monitors` sees them. strobe_busy is never
+    Causes: as in `hardwall.model.axis.supervisor`, as far as `hardwall.model.axes.monitors` sees them. strobe_busy is
+        never
     present: the rota has a clock for every axis, and nothing can begin in it sooner.
 
-    Latency: `latency` clocks from a strobe to the changed drive that is let out, 3 more than `Axes`. From a pin of a
-    loop that opens to a drive of zero `loop_latency` clock edges, the first of which sees it. From a fault of the
+    Latency: `latency` clocks from a strobe to the changed drive that is let out, 3 more than `Axes`. From the pin of an
+    opening loop to a drive of zero: `loop_latency` clock edges; the first one sees the pin. From a fault of the
     decoder, a word or the host to a drive of zero `trip_latency` clock edges at most: a rota, and the clocks of a turn.
 
     An acknowledgement within a rota of another one takes its place: the other is void. A preload, or a shift of the
@@ -72,9 +72,8 @@ class SupervisedAxes(wiring.Component):
 
     Members
     -------
-    the pins, pulses and outputs of `Axes` : In and Out
-        As there, but for `drive` and what says when it changed: the drive that the output stage asks for is
-        `record_drive`.
+    the pins, pulses and outputs of `Axes` : In and Out As there, except `drive` and the signal of its change:
+        `record_drive` is the drive from the output stage.
     encoder_a_n, encoder_b_n : In(axes)
         Complements of the encoders' channels; asynchronous. They count for nothing unless encoder_loss is enabled.
     drive_enable, external_fault, emergency_stop : In(axes)
@@ -145,7 +144,7 @@ class SupervisedAxes(wiring.Component):
 
     @property
     def loop_latency(self) -> int:
-        """Clock edges from the first that sees a loop open to the one that zeroes the drive, both included."""
+        """Clock edges from the first that sees a loop open to the zeroing of the drive, both included."""
         return 3
 
     @property
@@ -226,7 +225,7 @@ class SupervisedAxes(wiring.Component):
         return levels
 
     def _connect(self, m: Module, enable: Value) -> None:
-        """Connect the axes, whose own enable follows its loop, so that their slew limit begins at zero too."""
+        """Connect the axes. Their own enable follows the loop, so that their slew limit begins at zero, too."""
         axes, watchdog = self._axes, self._watchdog
         known = self._design.spec.design.words
         fixed = [number for number, word in enumerate(known) if word.name in FIXED]

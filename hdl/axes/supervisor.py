@@ -12,7 +12,8 @@ from .pipe import Kept, Pipe
 
 
 class Turn(NamedTuple):
-    """What the supervisor sees in a turn; what is not named here is as of `hardwall.hdl.axis.supervisor.Supervisor`.
+    """The inputs of the supervisor in a turn; inputs not described here are as of
+    `hardwall.hdl.axis.supervisor.Supervisor`.
 
     Attributes:
         stage: the stage in which all but the next two are there.
@@ -36,7 +37,7 @@ class Turn(NamedTuple):
 
 
 class Judged(NamedTuple):
-    """What a turn decides, 2 stages later.
+    """The decision of a turn, 2 stages later.
 
     Attributes:
         drives: whether the axis stays ARMED: otherwise the drive that is let out is zero.
@@ -140,7 +141,7 @@ class Supervisors:
         return pipe.taken(magnitude, "magnitude_now"), pipe.taken(negative, "negative_now")
 
     def _first(self, stage: int, first: Value, caught: Value, trip: Value) -> Value:
-        """Keep the causes and the clock of a trip; return those of the last one, a stage later."""
+        """Keep the causes and the clock of a trip; return the last trip's, a stage later."""
         kept = self._pipe.kept("first_trip", len(trip))
         kept.write(Mux(caught, trip, 0), self._pipe.axis(stage), enable=self._pipe.valid(stage) & (caught | first))
         return kept.read(stage + 1)

@@ -70,10 +70,10 @@ def _change(pipe: Pipe, past: history.Design, entered: Entered, length: Value) -
 def _older(
     pipe: Pipe, past: history.Design, stage: int, position: Value, head: Value, stored: Value, back: Value
 ) -> Value:
-    """Store the position that is in that stage, and return, a stage later, the one stored `back` positions before it.
+    """Store the position in that stage; a stage later, return the position stored `back` positions before it.
 
     Args:
-        head: its place among those of its axis.
+        head: its place among its axis's positions.
         stored: whether it is to be stored.
         back: as above, a stage earlier.
     """

@@ -20,11 +20,11 @@ class Axis(Component):
     """An axis from encoder pins to drive: decoder, velocity estimator, wall, passivity if it is so made, output stage.
 
     Every `spec.clocks_per_sample` clocks a strobe takes the count; `latency` clocks later the drive has changed. The
-    next strobe may come before that: then two samples are under way, and what belongs to one travels beside it.
+    next strobe may come before that. Then two samples are under way, and each sample's words travel with it.
 
     Parameters at run time: the words of `spec.design.words` are inputs. Pulse `commit` and hold the words until
     `commit_pending` falls: all words take effect together, from the sample of the next strobe on. The output stage
-    takes its words with the velocity of that sample, for until then it may be at work on the one before. After reset
+    takes its words with the velocity of that sample: until then it may still work on the sample before. After reset
     every parameter has its reset word (the wall is off).
 
     Faults: after an illegal transition, if the encoder is too fast for the decoder, or if the count has wrapped, the
@@ -73,8 +73,8 @@ class Axis(Component):
         High for one clock with `stepped`, if the edge found an index, at the count before it.
     estimated, saturated : Out(1)
         High for one clock with a sample's velocity; with it, the estimator is saturated.
-    strobe_busy : Out(1)
-        High for one clock behind a strobe that came before the last sample's velocity, which no spec allows.
+    strobe_busy : Out(1) High for one clock after a strobe that came before the last sample's velocity; no valid spec
+        has such strobes.
     illegal, overspeed, wrapped : Out(1)
         The encoder's sticky flags, now.
     illegal_count : Out
@@ -180,8 +180,8 @@ class Axis(Component):
             self.strobe_busy.eq(strobe & working & ~estimator.valid),
         ]
 
-        # What a strobe has taken is kept up to the velocity, with which the next strobe may come; and then up to the
-        # next velocity, which comes behind the changed drive.
+        # The words that a strobe has taken are kept up to the velocity; the next strobe may come with it. Then they are
+        # kept up to the next velocity, which comes after the changed drive.
         taken_count = Signal.like(self.sampled_count)
         taken_fault, fault = Signal(len(ENCODER_FLAGS)), Signal()
         with m.If(strobe):

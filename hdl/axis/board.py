@@ -22,11 +22,11 @@ from .supervised import COMPLEMENTS, LOOPS, SupervisedAxis
 ENCODER = ("encoder_a", "encoder_b", "encoder_z", *COMPLEMENTS)
 """Pins of the encoder."""
 CAPTURED = ("sampled", "wall_force", "driven", "state", "live", "flags", "stamp")
-"""What the capture memory takes as the axis shows it."""
+"""The axis's outputs that the capture memory takes unchanged."""
 
 
 class Board(wiring.Component):
-    """A supervised axis behind a dozen pins: `SupervisedAxis`, its link and its capture memory, which say what they do.
+    """A supervised axis behind a dozen pins: `SupervisedAxis`, its link and its capture memory; see there.
 
     A host reads and writes the registers of `registers`; what it asks for in one frame happens at one clock. It is
     refused an `arm` unless the axis is `ready`, and a `preload` or an `origin_shift` while ARMED. Neither is answered
@@ -36,16 +36,16 @@ class Board(wiring.Component):
     reverses the sign; it is taken in every state but ARMED.
 
     Safe are the pins of the drive as the stage says, and `alive` low; they are so from power-up on. A clock that stops
-    would keep them as they were: the oscillator, a second clock, finds that out, at most
-    `clock_monitor.Design.stop_latency_s` later, makes them safe, and acts as the loop of `drive_enable` does, so that
-    the axis is DISARMED when the clock comes back, and without a reference: edges may have been missed. Until both
-    clocks run and the reset has ended, `outputs_enable` is low: the outputs may be left to their pulls.
+    would freeze the pins. The oscillator, a second clock, detects this at most `clock_monitor.Design.stop_latency_s`
+    later and makes the pins safe. It then acts like the loop of `drive_enable`: when the clock comes back, the axis is
+    DISARMED and without a reference, because edges may have been missed. Until both clocks run and the reset has ended,
+    `outputs_enable` is low: the outputs may be left to their pulls.
 
     Latency: at most `latency` clocks from the sample strobe to pins that follow the changed drive. `drive_enable` or
     `emergency_stop` low makes the pins of the drive safe at once, through a gate that needs no clock; any cause makes
     them safe `safe_latency` clocks after it stands.
 
-    Rounding and overflow: those of the stage.
+    Rounding and overflow: as of the stage.
 
     Reset: `rst` resets everything but the synchronisers and the clock's monitor, 2 to 3 clocks later; power-up does the
     same.
@@ -54,10 +54,9 @@ class Board(wiring.Component):
     ----------
     spec : hardwall.model.spec.AxisSpec
         The axis.
-    link : Link or AxiLink, optional
-        What the host talks to, with the registers of this axis, and so with a capture memory of as many registers as
-        these say, or none; a serial line of 921 600 baud if it is not given, or what the clock allows of that, with the
-        registers that `RegisterMap` gives the axis.
+    link : Link or AxiLink, optional The link to the host, with the registers of this axis. The registers say how large
+        the capture memory is, or that there is none. Default: a serial line of 921 600 baud, or the highest rate that
+        the clock allows, with the registers that `RegisterMap` gives the axis.
 
     Members
     -------
@@ -173,7 +172,7 @@ class Board(wiring.Component):
         armed = axis.state == ARMED
         refused = {"arm": ~axis.ready, "preload": armed, "origin_shift": armed}
         # At most two samples of the old count, or of the old words, are under way, so the drive of the third actuation
-        # follows the new ones. An axis that is ARMED drives meanwhile anyway, so its commit does not wait for that.
+        # follows the new ones. An ARMED axis drives meanwhile anyway, so its commit does not wait for it.
         old = Signal(2)
         with m.If(axis.preload | axis.origin_shift | (axis.commit_pending & ~armed)):
             m.d.sync += old.eq(3)

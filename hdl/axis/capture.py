@@ -22,14 +22,14 @@ from ..arithmetic.fixed import shape
 from ..block import Block
 
 NO_FIRST_CONTENTS = "no_first_contents"
-"""The attribute of a memory that is never read before it is written: its Verilog says nothing of what is in it first,
-for only then do tools take a large memory of a part for it that has none."""
+"""The attribute of a memory that is never read before it is written. Its Verilog then has no initial content. Only so
+do tools use a part's large memory, which has none."""
 
 
 class Capture(Block):
     """A ring of records in a memory of one port, which the axis's samples write, and the host reads once it is frozen.
 
-    Equation: the model's, word for word, which has the states, the triggers, and what a record holds.
+    Equation: the model's, word for word; the model describes states, triggers and records.
 
     Latency: `data` is the register at `address` one clock later. A record takes 8 clocks from `sampled` on, a register
     each; the capture is done 2 clocks behind its last one.
@@ -47,8 +47,8 @@ class Capture(Block):
     -------
     sampled : In(1)
         High for one clock with the changed drive of a sample.
-    count, velocity, wall_force : In(SQ)
-        The count that was taken at the last sample, and what was made of it: count and force a clock before `sampled`.
+    count, velocity, wall_force : In(SQ) The count of the last sample, and the words made of it: count and force a clock
+        before `sampled`.
     driven : In(SQ)
         The drive that is let out, a clock behind `sampled`.
     state, live : In
@@ -61,8 +61,7 @@ class Capture(Block):
         Pulses: begin a capture, and trigger it by hand.
     one input for each word of `design.words` : In
         Run-time parameters, which act at the next clock.
-    address : In
-        A register of the window, whose first one is that of the oldest record.
+    address : In A register of the window, which begins with the oldest record.
     data : Out(16)
         The register that `address` had a clock before, if the capture was done then.
     done : Out(1)

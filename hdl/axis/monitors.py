@@ -27,9 +27,9 @@ class Monitors(Block):
 
     Latency: `latency` of a cause, from the inputs to `causes`; a new limit of the position acts a clock later.
     `velocity` and `saturated` are looked at with `valid`, `edge_kind` with `stepped`, and the distance to the last
-    index edge with `indexed`: velocity_limit and index_spacing are pulses. The others last for as long as what is wrong
-    does, which for the position must be two clocks. Ways are counted edge by edge: a preload or a shift of the origin
-    is no motion.
+    index edge with `indexed`: velocity_limit and index_spacing are pulses. The others last as long as their fault; a
+    position must be out of range for two clocks. Ways are counted edge by edge: a preload or a shift of the origin is
+    no motion.
 
     Rounding and overflow: distances are taken modulo the count's width; counters stop at their limits.
 
@@ -54,8 +54,7 @@ class Monitors(Block):
         Synchronised levels of the channels and of their complements.
     one input for each word of `design.words` : In
         Run-time parameters.
-    causes : Out
-        Bits as in `supervisor.CAUSES`; those that are not made here are 0.
+    causes : Out Bits as in `supervisor.CAUSES`; causes from elsewhere are 0.
     a_channel_idle : Out(1)
         Warning: the last edges were all of one channel.
 
@@ -120,8 +119,9 @@ class Monitors(Block):
         """Return whether the count is beyond a limit: one comparison, of both limits in turn."""
         at_low, wrong, wrong_before = Signal(init=1), Signal(), Signal()
         limit = Signal.like(self.count)
-        # The limit waits as its complement, which a subtraction adds: the low one with a carry, so that the difference
-        # is negative below it, and the high one without, so that it is not negative above it.
+        # The limit waits as its complement, which a subtraction adds. The low limit is added with a carry: the
+        # difference is then negative below it. The high limit is added without: the difference is then not negative
+        # above it.
         m.d.sync += [
             at_low.eq(~at_low),
             limit.eq(~Mux(at_low, self.supervisor_position_high, self.supervisor_position_low)),
@@ -207,6 +207,6 @@ def _within(value: Value, limit: Value) -> Value:
 
 
 def _halves(value: Signal, bits: int) -> tuple[Value, Value]:
-    """Return so many low bits of a signed value, and the others, of which one at least is its sign."""
+    """Return so many low bits of a signed value, and the other bits with the sign."""
     wide = Cat(value, value[-1].replicate(max(bits + 1 - len(value), 0)))
     return wide[:bits], wide[bits:]

@@ -89,9 +89,9 @@ class Output(Block):
         phase = Signal(range(max(design.decimation, 2)))
         turn = phase == 0 if design.decimation > 1 else Const(1)
 
-        # At every clock the window for the next drive follows the limits of the clock before, the drive, and an enable
-        # that is low: how far the drive may grow on each side, and how far it may be, whatever comes first. Which of
-        # them does is compared beside the sum: whether the drive is beyond what a step leaves below the force limit.
+        # At every clock the window for the next drive follows the limits of the clock before, the drive, and a low
+        # enable. The window is how far the drive may grow on each side, and how far it may be, whichever is smaller.
+        # Which one is smaller is compared beside the sum: whether the drive is within a step of the force limit.
         most = design.force_limit
         limit = Mux(self.output_force_limit > most, most, self.output_force_limit)
         highest, lowest = Signal(range(most + 1), init=most), Signal(range(-most, 1), init=-most)

@@ -11,7 +11,7 @@ from .wall import products
 
 
 def significant_bits(value: Value) -> Value:
-    """Return the number of bits of a signed value but for those that are all as its sign."""
+    """Return the number of bits of a signed value without its leading copies of the sign."""
     rest = len(value) - 1
     return length_of(value[:-1] ^ value[-1].replicate(rest)) if rest else Const(0)
 
@@ -31,9 +31,9 @@ class Passivity(Block):
         energy <- energy - drive (position - last position)    position: the count, and where in it the handle is
         given  =  force - part velocity                        for energy < 0 and a force, not beyond zero, else force
 
-    The part is passivity_damping 2**-n; what it dissipates until the next actuation is an eighth of the debt to twice
-    the debt, unless n is 0, but for its rounding to zero. A debt stays. A credit loses a share of 2**-`design.memory`
-    a sample, and all of it where there is no force. After a preload there is neither.
+    The part is passivity_damping 2**-n. Unless n is 0, it dissipates an eighth of the debt to twice the debt until the
+    next actuation, except for its rounding to zero. A debt stays. A credit loses a share of 2**-`design.memory` a
+    sample, and all of it where there is no force. After a preload there is neither.
 
     Latency: `latency` clocks from `forced` to `valid`. A sample's `lead` comes 2 clocks or more before its `strobe`,
     and not before the last one's; `forced` comes `behind` clocks or more behind the `strobe`, and the next `strobe`

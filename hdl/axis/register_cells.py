@@ -1,4 +1,4 @@
-"""The cells of a register file, and the register through which all goes that they give and take."""
+"""The cells of a register file, and the shift register through which they are read and written."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib.memory import Memory
@@ -53,6 +53,6 @@ class Cells:
         m.d.comb += self.found.eq(read.data)
 
     def take(self, m: Module, value: Value, turned: Value) -> None:
-        """Let `shift` take what is asked for: what is found, a value, or its turn by a bit."""
+        """Load `shift` as asked: the found word, a value, or itself rotated by a bit."""
         with m.If(self.fetched | self.given | self.turning):
             m.d.sync += self.shift.eq(Mux(self.turning, turned, Mux(self.given, value, self.found)))

@@ -21,13 +21,13 @@ SWEPT = CELL_BITS + 4
 
 
 class At(NamedTuple):
-    """What there is at the host's address.
+    """The register at the host's address.
 
     Attributes:
         below: its lowest bits.
         in_book, in_map, in_capture: whether it is a register of the book, of the window, of the capture memory.
         wide: it is one of two of a value.
-        is_pulse: it is that of a pulse.
+        is_pulse: the register is a pulse.
         half: a frame begins or ends with it, and has half of a value.
     """
 
@@ -53,16 +53,16 @@ class RegisterFile(wiring.Component):
       `done` of its lower half, which is written after the upper one. Only what was checked is written.
     - COUNT: add 1 to a counter, which wraps.
     - FINISH: if `commit` is marked, copy every written word to its active one; if a pulse of `WITH_WORDS` is, shift the
-      active words to their ports. Then all marked pulses are high for one clock, the same one; the words have been at
-      their ports for a clock or more, and stay until `done`, which comes when `commit_pending` has fallen: so what is
-      read back as active is in use.
-    - SNAPSHOT: take the status for what is read from then on, in the turns of `design.turns`: what is taken in one turn
-      is of one clock, and every value is whole. `taken_clocks` has the clock of each.
+      active words to their ports. Then all marked pulses are high for the same one clock. The words have been at their
+      ports for a clock or more, and stay until `done`. `done` comes when `commit_pending` has fallen, so words that are
+      read back as active are in use.
+    - SNAPSHOT: take the status for the following reads, in the turns of `design.turns`. The values of one turn are of
+      one clock, and every value is whole. `taken_clocks` has the clock of each.
 
     Latency, in clocks from the first of `start` to `done`: 1 for CHECK_READ; 2 for READ, 3 of the capture memory; 3 for
-    WRITE and COUNT; 4 for CHECK_WRITE; `snapshot_clocks` for SNAPSHOT; for FINISH 3 and, if a pulse of `WITH_WORDS` is
-    marked, `shift_clocks` and the wait for the sample. After a reset the first `start` may come at once; it waits up to
-    `boot_clocks`.
+    WRITE and COUNT; 4 for CHECK_WRITE; `snapshot_clocks` for SNAPSHOT. FINISH takes 3; if a pulse of `WITH_WORDS` is
+    marked, `shift_clocks` and the wait for the sample come on top. After a reset the first `start` may come at once; it
+    waits up to `boot_clocks`.
 
     Rounding and overflow: a value of fewer bits than its registers is extended by its sign or by zeros.
 
@@ -145,7 +145,7 @@ class RegisterFile(wiring.Component):
 
     @property
     def shift_clocks(self) -> int:
-        """Clocks by which words that are shifted make a FINISH longer, without the wait for the sample."""
+        """Additional clocks of a FINISH that shifts words, without the wait for the sample."""
         return 2 * len(self._design.registers.words) * (CELL_BITS + 6)
 
     @property
@@ -155,7 +155,7 @@ class RegisterFile(wiring.Component):
 
     @property
     def taken_clocks(self) -> dict[str, int]:
-        """Clocks from `start` of a SNAPSHOT to the one whose status is taken, by name.
+        """Clocks from `start` of a SNAPSHOT to the clock whose status is taken, by name.
 
         Of an edge it is the stamp as the axis shows it then, with `stepped`.
         """
@@ -213,7 +213,7 @@ class RegisterFile(wiring.Component):
     def _capture(self, m: Module, cells: Cells) -> None:
         """Let the capture memory be found in the place of the cells."""
         m.d.comb += self.capture_address.eq(self.host.address)
-        # That memory is large, and far away: what it gives has a register of its own first.
+        # That memory is large and far away: its output has its own register first.
         arrived = Signal(CELL_BITS)
         m.d.sync += arrived.eq(self.capture_data & self.capture_done.replicate(CELL_BITS))
         with m.If(cells.captured):
@@ -318,7 +318,7 @@ class RegisterFile(wiring.Component):
             m.next = "DONE"
 
     def _give_pulses(self, m: Module, pulses: Pulses) -> None:
-        """Add the states that give the pulses, and wait for the sample that takes the words."""
+        """Add the states that send the pulses and wait for the sample that takes the words."""
         with m.State("PULSE"):
             m.d.comb += Cat(ports(self, pulses.names).values()).eq(pulses.marks)
             m.d.sync += pulses.marks.eq(0)

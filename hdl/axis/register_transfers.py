@@ -15,7 +15,7 @@ from .register_cells import Cells
 class Transfers:
     """The chain: the bits of status that wait for their cells, or the words at their ports.
 
-    The bits of a stamp are those of a number that is 1 too high: `borrow` takes it off, bit by bit.
+    The bits of a stamp are the bits of a number that is 1 too high: `borrow` takes it off, bit by bit.
 
     Args:
         m: the module.
@@ -48,9 +48,9 @@ class Transfers:
         m.d.comb += words.eq(self.chain[-len(words) :])
         head = max(len(loads[each]) for each in (Source.EDGE, Source.EVENTS))
         shifted, moment, edge, events = (Cat(load, shifted[len(load) :]) for load in loads.values())
-        # Two cells of four inputs a bit: the first gives one of two, or which of the two others it is. The bits of
-        # `source` are three, or the one that both cells have would be one signal, which takes three cells. They are
-        # words, so that a simulator has a few operations for all the bits.
+        # Two cells of four inputs a bit: the first gives one of two, or which of the two others it is. `source` has
+        # three bits: with one shared bit for both cells, that signal would take three cells. They are words, so that a
+        # simulator has a few operations for all the bits.
         first = Mux(self.source[0], moment, shifted)
         which = Mux(self.source[1], self.source[0].replicate(head), first[:head])
         one_of_two = (which & events[:head]) | (~which & edge[:head])
@@ -112,9 +112,9 @@ class Transfers:
 def _edges(m: Module, file: Component, place: Value) -> tuple[Signal, Signal]:
     """Return one more than the stamp of the last edge of a kind, a clock after its place, and whether it has none.
 
-    A kind's place is the address of its status, halved; four in a row differ in the two lowest bits. A place that
-    is written is not read: what was read before holds, for which a place must be asked for at two clocks. Edges
-    of one kind are two clocks apart, for one of another kind is between them.
+    A kind's place is the address of its status, halved; four in a row differ in the two lowest bits. A place that is
+    written is not read: the word read before it stays. So a read must last two clocks. Edges of one kind are two clocks
+    apart, for one of another kind is between them.
     """
     places = [file.design.registers[name].address >> 1 & 3 for name in EDGE_STAMPS]
     # A memory is no logic: without the attribute so small a one would be made of flip-flops.

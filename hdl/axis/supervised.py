@@ -27,15 +27,15 @@ SHOWN = (
 
 
 class SupervisedAxis(wiring.Component):
-    """An axis from pins to the drive that is let out: `Axis`, `Monitors` and `Supervisor`, which say what they do.
+    """An axis from pins to the drive that is let out: `Axis`, `Monitors` and `Supervisor`; see there.
 
     The axis itself computes a drive all the time, and no host limits it; the supervisor's force limit comes last. The
     axis's own enable follows the loop of `drive_enable`, so that its slew limit begins at zero too. A commit of another
-    `encoder_invert` is a `disarm`, which an `arm` in the same clock gives way to; it is a `slip` too, and so is a cause
-    of `SLIPS` that is enabled.
+    `encoder_invert` is a `disarm`; an `arm` in the same clock gives way to it. It is a `slip`, too, and so is an
+    enabled cause of `SLIPS`.
 
-    Latency: `latency` clocks from the sample strobe to the changed `driven`, one more than the axis's. From a pin of
-    `LOOPS` that opens to a drive of zero `loop_latency` clock edges, the first of which sees it.
+    Latency: `latency` clocks from the sample strobe to the changed `driven`, one more than the axis's. From an opening
+    pin of `LOOPS` to a drive of zero: `loop_latency` clock edges; the first one sees the pin.
 
     Rounding and overflow: as in the blocks.
 
@@ -54,9 +54,9 @@ class SupervisedAxis(wiring.Component):
         Loops: high is closed; asynchronous.
     the requests of the host to `Supervisor` : In
         As there.
-    one input for each word of `design.words` : In
-        Run-time parameters; those of `design.committed` act at the sample after a commit, the others at the next clock.
-        One of the latter beyond its range in `design.ranges` is the cause word_range.
+    one input for each word of `design.words` : In Run-time parameters. The words of `design.committed` act at the
+        sample after a commit, the others at the next clock. One of these others beyond its range in `design.ranges` is
+        the cause word_range.
     the outputs of `Supervisor` : Out
         As there; `driven`, or `magnitude` and `negative`, is the drive that may leave the FPGA.
     drive_inverted : Out(1)
@@ -98,7 +98,7 @@ class SupervisedAxis(wiring.Component):
 
     @property
     def loop_latency(self) -> int:
-        """Clock edges from the first that sees a loop open to the one that zeroes the drive, both included."""
+        """Clock edges from the first that sees a loop open to the zeroing of the drive, both included."""
         return 3
 
     def elaborate(self, platform):

@@ -27,16 +27,15 @@ class Supervisor(Block):
 
     `link_timeout` is made here: it stands while ARMED and not `live`. The host is live from a change of `heartbeat`
     until so many ticks later as `supervisor_watchdog` says, up to one less because they run freely. The word is taken
-    with the change; whether it is in its range is for the cause word_range.
-    `latched` collects the causes until they are acknowledged, and an acknowledgement that does not name exactly these
-    has no effect, so a cause that came after the host's last look is not lost. `counts` are the occurrences of every
-    cause since reset.
+    with the change; whether it is in its range is for the cause word_range. `latched` collects the causes until they
+    are acknowledged. An acknowledgement that does not name exactly these causes has no effect. So a cause that came
+    after the host's last look is not lost. `counts` are the occurrences of every cause since reset.
 
-    Latency: one clock from `drive` to `driven`, from a cause or a low enable to zero, and from a lower
-    `supervisor_force_limit` to a drive that obeys it. No word is committed here: all act at the next clock.
+    Latency: one clock. It holds from `drive` to `driven`, from a cause or a low enable to zero, and from a lower
+    `supervisor_force_limit` to the drive. No word is committed here: all act at the next clock.
 
-    Rounding and overflow: the ceiling is rounded down to the force LSB, and keeps what is below that when the force
-    limit lowers it; counts saturate. The tick is a whole number of half periods of `alive`, 1 ms or just below.
+    Rounding and overflow: the ceiling is rounded down to the force LSB. It keeps its fraction when the force limit
+    lowers it. Counts saturate. The tick is a whole number of half periods of `alive`, 1 ms or just below.
 
     Parameters
     ----------
@@ -67,10 +66,9 @@ class Supervisor(Block):
         Run-time parameters.
     driven : Out(SQ)
         The drive that is let out, force LSB.
-    magnitude, negative : Out
-        The same as a magnitude and a sign; the latter is that of `drive` also where the limit is zero.
-    at_limit : Out(1)
-        The drive that is let out is all that may be, and is not zero.
+    magnitude, negative : Out The same as a magnitude and a sign. The sign is the one of `drive`, also where the limit
+        is zero.
+    at_limit : Out(1) The drive is at its limit, and is not zero.
     state : Out(2)
         0: DISARMED, 1: ARMED, 2: TRIPPED.
     alive : Out(1)

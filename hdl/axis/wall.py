@@ -38,8 +38,8 @@ class Wall(Block):
         push  = wall_stiffness depth + wall_damping side velocity     for depth > 0, else 0
         force = -side push
 
-    `wall_forbid_pull` holds push at 0 or more. In a coupling the velocity is that beyond `wall_velocity`, and with
-    `wall_two_sided` the push is that of every depth; both sides are held if `wall_forbid_pull` is 0.
+    `wall_forbid_pull` holds push at 0 or more. In a coupling the velocity is taken relative to `wall_velocity`. With
+    `wall_two_sided` the wall pushes at every depth; both sides hold if `wall_forbid_pull` is 0.
 
     Latency: `latency` clocks from `strobe` to `valid`. A sample's `lead` comes `design.lead` clocks or more before its
     `strobe`, and not before the last sample's `strobe`; it may come with that one.
@@ -113,8 +113,8 @@ class Wall(Block):
         m.d.sync += [known.eq(self.lead), placed.eq(known)]
         with m.If(self.lead):
             m.d.sync += counted.eq(self.count)
-        # The force is that of a spring to the surface and a damper, whatever the side: -side push = stiffness offset -
-        # damping velocity. The side says where it acts.
+        # The force is a spring to the surface and a damper, whatever the side: -side push = stiffness offset - damping
+        # velocity. The side says where it acts.
         with m.If(known):
             m.d.sync += offset.eq(self.wall_position - counted)
         pulled, spring = products("spring", self.wall_stiffness, offset)

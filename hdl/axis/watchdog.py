@@ -11,7 +11,7 @@ from ..block import Block
 
 
 class Watchdog(Block):
-    """Low `live` says that the host has been silent for too long; beside it a square wave that runs freely.
+    """`live` is low if the host has been silent for too long. A free-running square wave comes beside it.
 
     Equation: the host is live from a change of `heartbeat` until so many ticks later as `supervisor_watchdog` says, up
     to one less because they run freely. The word is taken with the change.

@@ -1,1 +1,1 @@
-"""What a board has around its axes: clocks, their monitor, and the way to the pins."""
+"""The parts of a board around its axes: clocks, their monitor, and the way to the pins."""

@@ -14,10 +14,10 @@ class ClockMonitor(Block):
 
     The block is in the domain of the second clock, the oscillator; what it watches makes the beat.
 
-    Equation: that of `hardwall.model.board.clock_monitor`.
+    Equation: as in `hardwall.model.board.clock_monitor`.
 
     Latency, in clocks of the oscillator: `running` is high `SYNCHRONISER + 1` edges after the second change of the
-    beat, the first of which sees it, and low `limit` edges after a change is seen so if there was no other.
+    beat; the first of these edges sees it. It is low `limit` edges after a change is seen so, if no other change came.
 
     Rounding and overflow: none; the counter stops at 0.
 

@@ -1,4 +1,4 @@
-"""The clocks of a board: the one of its axes with its reset, and the oscillator's, which watches it."""
+"""The clocks of a board: the axes' clock with its reset, and the oscillator's, which watches the first."""
 
 from typing import NamedTuple, Protocol
 

@@ -9,7 +9,8 @@ from ..wires import ports
 
 
 def lead_out(part: wiring.Component, around: wiring.Component, names: Collection[str]) -> list:
-    """Return the assignments that join ports of a part to those of the same names around it, in their direction."""
+    """Return the assignments that join the ports of a part to the ports of the same names around it, in their
+    direction."""
     outside, members = ports(around, names), part.signature.members
     return [
         inner.eq(outside[name]) if members[name].flow == In else outside[name].eq(inner)

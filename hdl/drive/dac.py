@@ -13,16 +13,16 @@ from .scale import Scale
 class Dac(Block):
     """The drive as frames for a serial DAC, which takes a frame at the rise of its chip select.
 
-    Equation: that of `hardwall.model.drive.dac`.
+    Equation: as in `hardwall.model.drive.dac`.
 
     Safe is `dac_clear_n` low: at once, through a gate alone, where `permitted` is low, and one clock after the axis is
-    not ARMED. The same ends a frame that is under way: the chip select rises before its last bit, so that a DAC which
-    counts bits does not take it; no other begins until the axis is ARMED.
+    not ARMED. The same ends a frame that is under way. The chip select rises before its last bit, so a DAC that counts
+    bits does not take the frame. No other frame begins until the axis is ARMED.
 
     Latency: `latency` clocks from the strobe of a drive to the rise of the chip select. A strobe while a frame is under
     way is not heard; `design.frame_clocks` after the last one it is.
 
-    Rounding and overflow: those of `Scale`; the code saturates at its upper end, a step below the full scale.
+    Rounding and overflow: as of `Scale`; the code saturates at its upper end, a step below the full scale.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class Dac(Block):
     Members
     -------
     strobe : In(1)
-        Pulse: the drive is that of a new actuation.
+        Pulse: the drive belongs to a new actuation.
     magnitude : In(UQ)
         The drive's magnitude, force LSB.
     negative : In(1)
@@ -75,7 +75,7 @@ class Dac(Block):
         ready, waiting = Signal(), Signal(scale.latency)
         m.d.sync += [ready.eq(self.armed), waiting.eq(Cat(self.strobe, waiting[:-1]))]
 
-        # A place is a half of the serial clock's period; the last one is that of the pause behind the frame.
+        # A place is a half of the serial clock's period; the last one is the pause after the frame.
         bits, last = params.frame_bits, 2 * params.frame_bits + 1
         place, left, word = Signal(range(last + 2)), Signal(range(max(params.half, 2))), Signal(bits)
         next_place, goes_on = Signal.like(place), place.any() & (left == 0)

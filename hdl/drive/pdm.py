@@ -13,16 +13,16 @@ from .scale import Scale
 class Pdm(Block):
     """First-order sigma-delta modulation of the drive, as sign and magnitude.
 
-    Equation: that of `hardwall.model.drive.pdm`: 2**N clocks of a steady amount have exactly `amount` pulses.
+    Equation: as in `hardwall.model.drive.pdm`: 2**N clocks of a steady amount have exactly `amount` pulses.
 
     Safe is `drive_pdm` low: at once, through a gate alone, where `permitted` is low, and one clock after the axis is
-    not ARMED, for its drive is zero then. With an amplifier in the stage the drive passes a scaling, behind which
-    `armed` is looked at, so that this is one clock, too.
+    not ARMED, because its drive is zero then. With an amplifier in the stage the drive passes a scaling. `armed` is
+    looked at after the scaling, so it takes one clock, too.
 
     Latency: `latency` clocks from a drive to the first pulse that it makes.
 
     Rounding and overflow: the remainder that no pulse has carried yet, less than one pulse, stays in the sum, also when
-    the sign changes. With an amplifier those of `Scale`.
+    the sign changes. With an amplifier, as of `Scale`.
 
     Parameters
     ----------

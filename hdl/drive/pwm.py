@@ -13,15 +13,15 @@ from .scale import Scale
 class Pwm(Block):
     """An H-bridge: the leg of the drive's sign is high for a part of every period, and otherwise low, as the other is.
 
-    Equation: that of `hardwall.model.drive.pwm`. The gates of a leg are never on together, and `dead` clocks of both
-    off are between them, whatever the inputs and the reset do.
+    Equation: as in `hardwall.model.drive.pwm`. The gates of a leg are never on together.
+    `dead` clocks with both off are between them, whatever the inputs and the reset do.
 
     Safe is all four gates low, so that the motor coasts: at once, through a gate alone, where `permitted` is low, and
     one clock after the axis is not ARMED. A drive of zero while ARMED brakes: both low gates are on.
 
     Latency: at most `latency` clocks from a drive to the pulse that it makes; the drive is taken at a period's end.
 
-    Rounding and overflow: those of `Scale`; the width saturates three dead times below the period.
+    Rounding and overflow: as of `Scale`; the width saturates three dead times below the period.
 
     Parameters
     ----------

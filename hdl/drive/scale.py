@@ -12,7 +12,7 @@ from ..block import Block
 class Scale(Block):
     """The drive, in steps of a stage's output.
 
-    Equation: that of `hardwall.model.drive.scale`.
+    Equation: as in `hardwall.model.drive.scale`.
 
     Latency: `latency` clocks from a drive to its steps; a drive every clock.
 

@@ -28,15 +28,14 @@ class Seen(wiring.Signature):
         Position, counts.
     stamp : Out(stamp_width)
         Clocks since reset.
-    stamp_a_rise, stamp_b_rise, stamp_a_fall, stamp_b_fall : Out(stamp_width)
-        `stamp` in the clock that decoded the last edge of that kind, one clock before the edge's count is out.
+    stamp_a_rise, stamp_b_rise, stamp_a_fall, stamp_b_fall : Out(stamp_width) `stamp` in the clock that decoded the last
+        edge of that kind: one clock before the edge's count is out.
     edge : Out(2)
         Kind of the last counted edge: 0 A rose, 1 B rose, 2 A fell, 3 B fell. Its stamp is the stamp of this kind.
     down : Out(1)
         Whether that edge counted -1.
-    run : Out(3)
-        Successive edges that counted in that direction, at most 4: that many stamps belong to this run. It is 0 before
-        the first edge, and after an illegal change.
+    run : Out(3) Successive edges counted in that direction, at most 4: as many stamps belong to this run. It is 0
+        before the first edge, and after an illegal change.
     """
 
     def __init__(self, count_width: int, stamp_width: int):
@@ -61,45 +60,45 @@ class Quadrature(wiring.Component):
     Equation: with (A, B) in the order 00, 10, 11, 01, 00 every edge of the filtered pins counts +1, in the other order
     -1; `invert` swaps the signs. So in a cycle of 4 counts A rises at 0, B rises at 1, A falls at 2, B falls at 3.
 
-    Latency: `latency(glitch_clocks)` = glitch_clocks + 4 clock edges, from the first that sees a pin changed to the
-    one after which the new count is out, both included: two for the synchroniser, glitch_clocks + 1 for the filter and
-    one to decode and add. Throughput: one edge a clock. All three pins have the same delay.
+    Latency: `latency(glitch_clocks)` = glitch_clocks + 4 clock edges, from the first that sees a changed pin to the
+    setting of the new count, both included. Two are for the synchroniser, glitch_clocks + 1 for the filter and one to
+    decode and add. Throughput: one edge a clock. All three pins have the same delay.
 
     Filter: a channel takes a new level once that level was seen at glitch_clocks + 1 successive clocks. A pulse
     shorter than glitch_clocks clocks never passes, and a pulse longer than glitch_clocks + 1 clocks always passes,
     whatever its phase. `glitch_clocks` may change at any time: edges keep their order. If it is lowered while edges of
     both A and B wait, both pass at once, which is `illegal` like any other such pair.
 
-    Speed: the count is exact up to 1 / max(1, (glitch_clocks + 1) / 2) edges a clock (`max_edge_rate` of the model,
-    which derives all of this, also for edges out of place). Beyond that rate, as long as every level of A and of B
-    lasts a clock or more (below 2 edges a clock), `fault` is up no later than the first wrong count, whatever the
-    motion. At a steady rate of ideal quadrature above 2 edges a clock it is up within `clocks_to_fault` of the model,
-    unless the rate is within the exact range of a multiple of 4, where the samples equal those of a slow motion. Two
-    flags are for that. `illegal`: A and B changed in one clock; nothing is counted or stamped. `overspeed`: the
-    filter rejected a pulse on A or B during which, its first and last clocks included, the other channel had an edge.
-    A lone glitch raises neither flag; a glitch that meets an edge of the other channel cannot be distinguished from
-    speed, and raises `overspeed`.
+    Speed: the count is exact up to 1 / max(1, (glitch_clocks + 1) / 2) edges a clock. The model derives all of this,
+    also for edges out of place (`max_edge_rate`). Beyond that rate `fault` is up no later than the first
+    wrong count, whatever the motion. This holds as long as every level of A and of B lasts a clock or more (below 2
+    edges a clock). At a steady rate of ideal quadrature above 2 edges a clock it is up within `clocks_to_fault` of the
+    model. An exception is the exact range around a multiple of 4: there the samples equal a slow motion's. Two flags
+    are for that. `illegal`: A and B changed in one clock; nothing is counted or stamped. `overspeed`: the filter
+    rejected a pulse on A or B during which, its first and last clocks included, the other channel had an edge. A lone
+    glitch raises neither flag; a glitch that meets an edge of the other channel cannot be distinguished from speed, and
+    raises `overspeed`.
 
     Start: counting starts from the pins as sampled by the first clock after a reset, whatever their levels.
 
     Index: one edge of Z's pulse, the same from both sides: there Z rises as the count goes up, and falls as it goes
-    down. Every edge of A and B looks at Z on its lower side: upwards just before its clock, downwards at it. Of two
-    successive edges in one direction, with no slip since the first one, the second finds an index if Z was 0 at the
-    lower and 1 at the upper of them. Its place is the count between the two. So a handle that turns round is no matter,
-    nor are scales on which A, B and Z have a hysteresis below a count: the pulse's other edge is never taken. The count
-    is beside the place by one (below it if the edge counted -1) when the index is found. A pulse between two edges is
-    no index: Z has to last a count. An edge of Z that lies on an edge of A or B may come a clock before or after it, or
-    elsewhere upwards than downwards, and is then a count off.
+    down. Every edge of A and B looks at Z on its lower side: upwards just before its clock, downwards at it. Take two
+    successive edges in one direction, with no slip since the first one. The second one finds an index if Z was 0 at the
+    lower and 1 at the upper of them. Its place is the count between the two. So a turn of the handle does not matter,
+    nor does a hysteresis of A, B and Z below a count: the pulse's other edge is never taken. The count is beside the
+    place by one (below it if the edge counted -1) when the index is found. A pulse between two edges is no index: Z has
+    to last a count. An edge of Z that lies on an edge of A or B may come a clock before or after it. It may also lie
+    elsewhere upwards than downwards. It is then a count off.
 
     Slip: after `illegal`, `overspeed`, `wrapped`, another `invert` or `slip` the count belongs no more to the scale. In
-    that clock `index_latched` and `referenced` fall. `preload` makes them fall too, for nobody knows by how much it
+    that clock `index_latched` and `referenced` fall. `preload` makes them fall too, because nobody knows by how much it
     moves the count.
 
     Rounding and overflow: nothing is rounded. `count`, `index_count` and the stamps wrap, `illegal_count` saturates. An
     edge or a shift of the origin that takes the count beyond an end of its range raises `wrapped` with the wrong count.
 
-    Coincidences: an edge decoded in the clock of `preload` is added to `preload_count`, and one in the clock of
-    `origin_shift` to the moved count, so no motion is lost. An index latched in the clock of either has the new count.
+    Coincidences: no motion is lost. An edge decoded in the clock of `preload` is added to `preload_count`. In the clock
+    of `origin_shift` it is added to the moved count. An index latched in the clock of either has the new count.
     `preload` has priority over `origin_shift`. `arm` has priority over an index, which is then not latched; a fault in
     the clock of `clear` stays.
 
@@ -160,8 +159,8 @@ class Quadrature(wiring.Component):
     ValueError
         If a width is out of its range.
 
-    Source: decoding by 4 and the filter of consecutive equal samples as in decoder chips (HCTL-2022 data sheet, Avago,
-    "Digital Noise Filter", fixed there at 3 samples); the flag for edges that such a filter hides is derived in the
+    Source: decoding by 4 and the filter of consecutive equal samples are as in decoder chips (HCTL-2022 data sheet,
+    Avago, "Digital Noise Filter"; 3 samples there); the flag for edges that such a filter hides is derived in the
     model.
     """
 
@@ -332,7 +331,7 @@ class Quadrature(wiring.Component):
         onward = known & (self.seen.down == down)
         m.d.comb += [
             lost.eq(both | outrun | self.slip | (self.invert ^ inverted)),
-            # Z on the lower side of this edge; `below` is that of the last one, if it is known.
+            # Z on the lower side of this edge; `below` is the last edge's, if it is known.
             z.eq(level[2] ^ (moved[2] & ~down)),
             index.eq(one & onward & (below == down) & (z != down) & ~lost),
         ]
@@ -345,8 +344,8 @@ class Quadrature(wiring.Component):
         Args:
             m: the module.
             index, place: whether there is an index, and its place.
-            lost, beyond: whether the count loses its scale otherwise than beyond its range, and there. The latter comes
-                late in a clock.
+            lost, beyond: whether the count loses its scale within its range, and whether it does so beyond it. `beyond`
+                comes late in a clock.
         """
         latches = self.index_armed & index & ~self.arm
         with m.If(self.arm):

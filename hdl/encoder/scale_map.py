@@ -13,11 +13,11 @@ from ..block import Block
 class ScaleMap(Block):
     """The error of the place of an edge, by the edge's number.
 
-    Equation: with bins of 2**bin_bits edges from edge `first` on, places[floor((n - first) / 2**bin_bits)]; beyond the
-    bins that of the nearest one; 0 without `enabled`. n is `number` less all that the origin was shifted by while
-    `enabled`, so that an edge keeps its bin.
+    Equation: the bins have 2**bin_bits edges each, from edge `first` on. error = places[floor((n - first) /
+    2**bin_bits)]; beyond the bins it is the nearest bin's, and 0 without `enabled`. n is `number` less all shifts of
+    the origin while `enabled`, so an edge keeps its bin.
 
-    Latency: `error` and `outside` are those of the number `latency` clocks before; a new number may come every clock.
+    Latency: `error` and `outside` belong to the number `latency` clocks before. A new number may come every clock.
     A word that is written is read from the next clock on.
 
     Rounding and overflow: n is taken modulo the count's width; n less `first` has a bit more than a number.

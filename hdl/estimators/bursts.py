@@ -16,8 +16,8 @@ class Bursts(Block):
 
         jolt = three edges in one direction within `span` clocks, and 4 (their clocks + 1) < that age
 
-    `found` is 1 from the third jolt on with an age of more than `tolerated`, each within `memory` samples of the one
-    before, until none comes. The model's module derives the limits.
+    `found` is 1 from the third jolt on. The jolts have an age of more than `tolerated`, and each comes within `memory`
+    samples of the one before. `found` stays 1 until none comes. The model's module derives the limits.
 
     Latency: `latency` clocks from `strobe` to both outputs; the next `strobe` may come no earlier.
 

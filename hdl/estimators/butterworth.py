@@ -22,7 +22,7 @@ class Estimator(EstimatorBlock):
     Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`. One multiplier makes
     the three products.
 
-    Rounding and overflow: operands and products round down, the velocity half up; d, w and y saturate, with flags; w
+    Rounding and overflow: operands and products round down, the velocity half up. d, w and y saturate, with flags. w
     and y saturate only while the coefficients belong to no single cutoff, or just after a change of cutoff. A third
     flag is up while the coefficients are unstable. The count may wrap.
 

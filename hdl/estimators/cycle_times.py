@@ -164,7 +164,7 @@ class CycleTimes(wiring.Component):
                 ]
                 m.next = "LEFT"
             with m.State("LEFT"):
-                # The edge of this kind that the last sample knew is so many counts before the last edge of that sample.
+                # The last sample's edge of this kind is so many counts before its last edge.
                 behind = (-forward)[:2]
                 held = Mux(cycles > self._cycles_max, self._cycles_max, cycles)
                 m.d.sync += [
@@ -177,7 +177,7 @@ class CycleTimes(wiring.Component):
                 ]
                 m.next = "OPPOSITE"
             with m.State("OPPOSITE"):
-                # The two neighbouring kinds are those of the edge before and of the edge three before; ages tell which.
+                # The two neighbouring kinds belong to the edge before and to the edge three before; ages tell which.
                 both = known & right_known & last_known & (run == RUN_MAX)
                 either = (known | right_known) & last_known & (run >= 2)
                 m.d.sync += [

@@ -46,8 +46,8 @@ class Estimator(EstimatorBlock):
     Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`. One multiplier makes
     all seven products, each in two halves: the right operand is wider than a multiplier of the part.
 
-    Rounding and overflow: what a product corrects is rounded half up, the change of velocity, the mean and the bound
-    are rounded down, and so the line half up. Velocities and the error of the place saturate, with flags; the
+    Rounding and overflow: the values that a product corrects are rounded half up; the change of velocity, the mean and
+    the bound are rounded down, and so the line half up. Velocities and the error of the place saturate, with flags; the
     acceleration saturates, which is its limit. Count and stamp may wrap.
 
     Parameters
@@ -57,8 +57,8 @@ class Estimator(EstimatorBlock):
 
     Members, with a map of the scale, beside those of every estimator
     -----------------------------------------------------------------
-    map_enabled, map_shift, map_shift_count, map_write, map_bin, map_written : In
-        Those of `hardwall.hdl.encoder.scale_map.ScaleMap`. They change only before a sample with `restart`.
+    map_enabled, map_shift, map_shift_count, map_write, map_bin, map_written : In As of
+        `hardwall.hdl.encoder.scale_map.ScaleMap`. They change only before a sample with `restart`.
     map_outside : Out(1)
         From `valid` until the next `strobe`: the last edge is beyond the map's bins.
 
@@ -92,7 +92,7 @@ class Estimator(EstimatorBlock):
             with m.State("SAMPLE"), m.If(self.strobe):
                 self._take(m, s)
                 m.next = next(iter(sequence))
-            # Every state takes one clock: what it always does, and then what it does under a condition.
+            # Every state takes one clock: first its unconditional actions, then the conditional ones.
             for (name, statements), following in zip(sequence.items(), after, strict=True):
                 with m.State(name):
                     m.d.sync += statements
@@ -146,7 +146,7 @@ class Estimator(EstimatorBlock):
         ]
 
     def _sample(self, s):
-        """Return the states that take the interval, and what passed in it."""
+        """Return the states that take the interval and the edges passed in it."""
         d, half = self._design, _size(s.v) >> 1
         return {
             "DIFFERENCE": [
@@ -176,7 +176,7 @@ class Estimator(EstimatorBlock):
         }
 
     def _innovation(self, s):
-        """Return the states that predict the place of the edge, and take the mean of what it is off by."""
+        """Return the states that predict the place of the edge, and take the mean of the errors."""
         p = s.params
         travelled = shift_floor(s.total, p.travel_shift)
         limited = saturate(s.far, -p.error_max, p.error_max)

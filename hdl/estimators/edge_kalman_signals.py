@@ -91,5 +91,5 @@ class Signals:
         return max(len(self.total) - shift, 1)
 
     def waits(self, shift: int):
-        """Return the statement that keeps the low limb's product, with half of what a shift will round off."""
+        """Return the statement that keeps the low limb's product, with half of the LSB that a shift will round off."""
         return self.low.eq(self.product + (1 << (shift - 1) if shift > 0 else 0))

@@ -71,7 +71,7 @@ class EstimatorBlock(Block):
         Args:
             m: the block's module.
             moved: takes the difference from the last count: 0 at the first sample and with `restart`.
-            forget: called with the condition that there is no past; describes what is done with the strobe then.
+            forget: called with the condition that there is no past; describes the actions at the strobe in this case.
             sequence: the statements of every step, by its name.
         """
         running = Signal()

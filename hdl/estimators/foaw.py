@@ -16,7 +16,7 @@ FIRST = HISTORY_LATENCY + 1
 class Estimator(EstimatorBlock):
     """The slope over the longest window in which the counts are a line.
 
-    Equation, with D_i the change over i taps of T samples, d the band, and n the largest number of taps, at most
+    Equation, with D_i the change over i taps of T samples, and d the band. n is the largest number of taps, at most
     `foaw_window`, up to which every tap passes
 
         (D_i - d) / i <= D_n / n <= (D_i + d) / i                        for i < n
@@ -25,8 +25,8 @@ class Estimator(EstimatorBlock):
 
     Before the first sample the axis counts as having stood at its position, so velocity is 0 at the first sample.
 
-    Latency: `latency` clocks from `strobe` to `valid`: one a tap, and those of the division; the next `strobe` may come
-    with `valid`.
+    Latency: `latency` clocks from `strobe` to `valid`: one a tap, and the clocks of the division; the next `strobe` may
+    come with `valid`.
 
     Rounding and overflow: the search is exact; the velocity rounds toward zero. The change of a sample is limited to
     the velocity format, with a flag; the velocity then always fits. The count may wrap.

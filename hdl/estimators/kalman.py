@@ -22,8 +22,8 @@ class Estimator(EstimatorBlock):
     Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`. One multiplier makes
     the three products.
 
-    Rounding and overflow: r, the products and narrowed sums round down, the velocity half up; the difference of counts,
-    x - count, v and a saturate, with flags; x - count, v and a saturate only with gains that belong to no noise model.
+    Rounding and overflow: r, the products and narrowed sums round down, the velocity half up. The difference of counts,
+    x - count, v and a saturate, with flags. x - count, v and a saturate only with gains that belong to no noise model.
     The count may wrap.
 
     Parameters

@@ -22,8 +22,8 @@ class Estimator(EstimatorBlock):
 
     Before the first sample the axis counts as having stood at its position, so velocity is 0 at the first sample.
 
-    Latency: `latency` clocks from `strobe` to `valid`: one a difference, and those of the division; the next `strobe`
-    may come with `valid`. One multiplier makes the products.
+    Latency: `latency` clocks from `strobe` to `valid`: one a difference, and the clocks of the division; the next
+    `strobe` may come with `valid`. One multiplier makes the products.
 
     Rounding and overflow: the sum is exact; the velocity rounds toward zero. The change of a sample is limited, with a
     flag; the velocity then always fits. The count may wrap.

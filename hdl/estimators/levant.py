@@ -23,7 +23,7 @@ class Estimator(EstimatorBlock):
     Start: at the first sample, and with `restart`, x = count and u1 = 0, so u = 0: a start from rest has no transient.
 
     Latency: `latency` clocks from `strobe` to `valid`: one for the distance, one for its magnitude, and one for every
-    two bits of the root, beside which lambda is multiplied; the next `strobe` may come with `valid`.
+    two bits of the root; lambda is multiplied meanwhile. The next `strobe` may come with `valid`.
 
     Rounding and overflow: the root rounds down and half of its LSB is added back; u rounds half up; e, u and u1
     saturate, with flags. The count may wrap.
@@ -84,8 +84,8 @@ class Estimator(EstimatorBlock):
     def _corrected(self, m, e, u1, root, rooting):
         """Return u1 plus `step` (2 root + 1) within u's format, and whether it was beyond, in the root's last clock.
 
-        No product waits for the root. Its digits come high ones first; at every clock the sum so far goes up by a
-        digit's place, takes in two bits of u1 from below, and adds the digit's multiple of the step.
+        No product waits for the root. Its digits come high ones first; at every clock the sum moves up by a digit's
+        place and takes in two bits of u1 from below; then it adds the digit's multiple of the step.
         """
         design, velocity = self.design, self.design.velocity
         digits = sqrt_digits(design.radicand.width)
@@ -97,8 +97,8 @@ class Estimator(EstimatorBlock):
         begun = Signal(signed(max(velocity.width + finer, len(step) + 2 * digits + 1) + 1))
         low, total, still = Signal(2 * digits), Signal(signed(len(begun) - 1)), Signal()
 
-        # The step has the other sign than e. A complement is one less than the negative: as the half LSB of u that is
-        # added for the rounding must be, for it is the product that is rounded half up.
+        # The step has the other sign than e. A complement is one less than the negative. So must be the half LSB of u
+        # that is added for the rounding, because the product is rounded half up.
         lambda_ = Cat(Const(0, coarser), self.levant_lambda, Const(0, 1)).as_signed()
         inverse = ~e[-1]
         against, fourfold = _inverted(lambda_, inverse), _inverted(lambda_ << 2, inverse)

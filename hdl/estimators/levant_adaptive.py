@@ -19,8 +19,8 @@ class Estimator(levant_semi_implicit.Estimator):
         x  <- x + u
 
     As soon as |b| is more than quantisation explains, j falls to the level that the time since the last change of b's
-    sign requires, and if |b| doubles, further, below 0 too; it rises by one after a time of calm. The design's module
-    has the law.
+    sign requires. If |b| doubles it falls further, below 0 too. It rises by one after a time of calm. The design's
+    module has the law.
 
     Start: at the first sample, and with `restart`, x = count, u1 = 0 and j = 0, so u = 0: a start from rest has no
     transient.
@@ -28,8 +28,8 @@ class Estimator(levant_semi_implicit.Estimator):
     Latency: `latency` clocks from `strobe` to `valid`, most of them for the root; the next `strobe` may come with
     `valid`.
 
-    Rounding and overflow: alpha 2**-j rounds down; the root rounds down and half of its LSB is added back; g rounds
-    half up, and everything else is exact; b, u and u1 saturate, with flags. The count may wrap; no counter of the law
+    Rounding and overflow: alpha 2**-j rounds down. The root rounds down and half of its LSB is added back. g rounds
+    half up, and everything else is exact. b, u and u1 saturate, with flags. The count may wrap; no counter of the law
     can.
 
     Parameters

@@ -15,16 +15,16 @@ from .levant_edge_signals import Signals
 
 
 class Estimator(EstimatorBlock):
-    """Levant's differentiator on edges: the error is that of the place predicted for an edge when it comes.
+    """Levant's differentiator on edges: the error is taken at an edge, against the place predicted for it.
 
-    Equation, at an edge T clocks and n edges after the last edge in use, with 2**(L-1) <= T < 2**L, in counts, samples
-    and clocks:
+    Equation, in counts, samples and clocks; an edge comes T clocks and n edges after the last edge in use, with
+    2**(L-1) <= T < 2**L:
 
         E = (v + a T/2) T - (n + the difference of the two edges' places) D
         v <- v + a T - min(|E| / T, lambda sqrt(|E| 2**L)) sign(E)
         a <- a - min(change of v / 2**L, alpha 2**L) sign(E)
 
-    (where |E| >= D, without the limit by lambda), and at every sample, s clocks after that edge, velocity = v + a s,
+    (where |E| >= D, without the limit by lambda); and at every sample, s clocks after that edge, velocity = v + a s,
     held within the bound for no further edge; 0 at rest. The places of the four edges of a cycle are learnt from E.
     `hardwall.model.estimators.levant_edge` has the whole law.
 
@@ -271,7 +271,7 @@ class Estimator(EstimatorBlock):
         """Add the states that extrapolate the velocity from the anchor and hold it within the bound for no edge."""
         d = self._design
         with m.State("LINE PRODUCT"):
-            # A motion that goes on, faster than the bound allows, shows that the bound was none.
+            # A motion that goes on faster than the bound allows shows that the bound was wrong.
             goes_on = s.was_still | ((s.v < 0) == s.was_down)
             m.d.sync += [
                 s.onward.eq(Mux(s.room < 0, 0, s.room)),

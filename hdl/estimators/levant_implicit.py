@@ -23,8 +23,8 @@ class Estimator(levant_semi_implicit.Estimator):
     Latency: `latency` clocks from `strobe` to `valid`, most of them for the root; the next `strobe` may come with
     `valid`. One multiplier makes lambda^2 before the root, and lambda times the root after it.
 
-    Rounding and overflow: the root rounds down and half of its LSB is added back; lambda^2 / 4 rounds down to the
-    root's radicand; g, the difference of two parts that round half up, is held within 0 to beyond; b, u and u1
+    Rounding and overflow: the root rounds down and half of its LSB is added back. lambda^2 / 4 rounds down to the
+    root's radicand. g is the difference of two parts that round half up, and is held within 0 to beyond. b, u and u1
     saturate, with flags. The count may wrap.
 
     Parameters
@@ -43,7 +43,7 @@ class Estimator(levant_semi_implicit.Estimator):
         return super().elaborate(platform)
 
     def _factor(self, root):
-        # `done` is high for the one clock in which the second product is taken.
+        # `done` is high for one clock, in which the second product is taken.
         return Mux(root.done, super()._factor(root), self._word(0))
 
     def _square(self, m, product):

@@ -22,8 +22,8 @@ class Estimator(EstimatorBlock):
     Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`. One multiplier makes
     both products: h e, and h times that.
 
-    Rounding and overflow: v where it is added to x, e and the products round down, the velocity half up; the difference
-    of counts, x - count and v saturate, with flags; x - count saturates only with a bandwidth below the design's range,
+    Rounding and overflow: v where it is added to x, e and the products round down, the velocity half up. The difference
+    of counts, x - count and v saturate, with flags. x - count saturates only with a bandwidth below the design's range,
     v only after a change of the bandwidth. The count may wrap.
 
     Parameters

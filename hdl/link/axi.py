@@ -18,8 +18,8 @@ class Subordinate(wiring.Component):
 
     Equation: the model's, word for word.
 
-    Latency: to the answer less than 20 clocks, and for a status that is read out of order, or for a commit, the
-    register file's times besides. Address and data of a write are taken together.
+    Latency: to the answer less than 20 clocks; a status that is read out of order, and a commit, take the register
+    file's times besides. Address and data of a write are taken together.
 
     Rounding and overflow: none.
 

@@ -16,13 +16,13 @@ from ..arithmetic.fixed import shape
 from ..wires import ports
 
 RECORD = "count", "velocity", "wall_force", "drive", "flags"
-"""What the axes show of a sample, behind `record_`."""
+"""The axes' outputs for a sample; their names begin with `record_`."""
 TURN = "state", "ready", "latched", "first", "first_stamp", "counts", "a_channel_idle"
-"""What they show of a turn, behind `turn_`."""
+"""The axes' outputs for a turn; their names begin with `turn_`."""
 WITH_RECORD = "illegal_count", "index_count", "index_armed", "index_latched"
-"""What they show of every axis at every clock, of which an axis's is taken with its record."""
+"""Outputs for every axis at every clock; an axis's are taken with its record."""
 OF_CAPTURE = "capture_state", "capture_place", "capture_stamp"
-"""What the capture memory shows, if there is one: the same in every bank, taken with the turn."""
+"""The status of the capture memory, if there is one: the same in every bank, taken with the turn."""
 EDGE_KIND_BITS = (len(EDGE_STAMPS) - 1).bit_length()
 
 
@@ -105,7 +105,7 @@ class Moments(NamedTuple):
     """When the status of an axis is taken: signals, each high for one clock.
 
     Attributes:
-        strobed: the clock before was that of a strobe of the axis.
+        strobed: the axis had its strobe a clock before.
         recorded, turned: the record of that sample, and then its turn, is shown.
     """
 
@@ -119,7 +119,7 @@ def held_status(m: Module, file: wiring.Component, asked: Signal, moments: Momen
 
     Args:
         m: the module.
-        file: the `BankedFile`, whose inputs are those of `shown`.
+        file: the `BankedFile`; its inputs are named as in `shown`.
         asked: the axis whose status is asked for.
         moments: when it is taken.
     """

@@ -1,4 +1,4 @@
-"""What the register files of one axis and of several check: a register, a value against its bounds, and pulses."""
+"""The checks of the register files of one axis and of several: a register, a value against its bounds, and pulses."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib.wiring import Component, PureInterface
@@ -16,13 +16,13 @@ class Pulses:
         m: the module.
         host: what the server asks for.
         registers: the map.
-        is_pulse, place: whether the address is that of a pulse, and its lowest bits.
+        is_pulse, place: whether the address is a pulse's, and its lowest bits.
 
     Attributes:
         names: the names of all pulses.
-        marks: those that are written.
-        wanted: those that the address and the value ask for.
-        exclusive, after: the exclusive ones of the frame until now, and with those that are wanted.
+        marks: the written ones.
+        wanted: the pulses that address and value ask for.
+        exclusive, after: the exclusive pulses of the frame so far, and the same with the wanted pulses.
         several: whether one of these is refused.
     """
 
@@ -47,7 +47,7 @@ class Pulses:
         return self.marks[self.names.index(name)]
 
     def begin(self, m: Module, host: PureInterface, *others) -> None:
-        """Forget with `host.clear` what was found in the last frame; `others` are assignments that do so, too."""
+        """Forget the findings of the last frame with `host.clear`; `others` are further assignments for this."""
         with m.If(host.clear):
             m.d.sync += [host.absent.eq(0), host.outside.eq(0), host.refused.eq(0), *others, self.exclusive.eq(0)]
 

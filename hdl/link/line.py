@@ -11,7 +11,7 @@ from hardwall.model.link.line import BROADCAST, COUNTED, FIXED, FRAME_MAX, FRAME
 
 BYTE = 8
 UNMIXED = {"no_rw_check": 1}
-"""The attribute of a memory of which nothing is used that is read from a place at the clock at which it is written."""
+"""The attribute of a memory in which data read in the clock of a write to the same address is not used."""
 
 
 class Frames(wiring.Signature):
@@ -52,10 +52,9 @@ class Frames(wiring.Signature):
 class Line(wiring.Component):
     """Bytes from a receiver to frames with a verdict, and answers with their CRC to a transmitter.
 
-    Equation: a frame ends with the byte that its function and byte count make its last one. If that is not known it
-    ends when no byte has arrived for `gap_clocks` clocks; a frame that this finds short of its known end is spoilt, as
-    is a frame of 256 bytes without an end, with a bad CRC or with a spoilt byte. The model says why no single flipped
-    bit passes.
+    Equation: a frame ends with the byte that its function and byte count make its last one. If the length is unknown,
+    the frame ends when no byte has arrived for `gap_clocks` clocks. A frame is spoilt if it ends so before its known
+    length, has 256 bytes without an end, a bad CRC or a spoilt byte. The model says why no single flipped bit passes.
 
     After a spoilt frame, bytes are dropped until a gap, without another verdict. Others that arrive while a frame is
     judged, is `ended`, or its answer is under way are dropped, too: then comes the verdict `OVERRUN`, and up to a gap

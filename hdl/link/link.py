@@ -28,9 +28,9 @@ class Link(wiring.Component):
     most 256 bytes; `hardwall.model.axis.registers` has the addresses, and `hardwall.model.axes.registers`. The line's
     idle level is high.
 
-    Latency: an answer begins when the request has been carried out: less than 6000 clocks after its last byte, and for
-    a commit up to a sample period more; of several axes, what a `BankedFile` waits for. A pulse is at its port before
-    the answer begins.
+    Latency: an answer begins when the request has been carried out: less than 6000 clocks after its last byte. A commit
+    takes up to a sample period more, and with several axes the waits of `BankedFile`. A pulse is at its port before the
+    answer begins.
 
     Rounding and overflow: as in the blocks.
 

@@ -1,4 +1,4 @@
-"""What a server asks of a register file, and what comes back."""
+"""The requests of a server to a register file, and the answers."""
 
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
@@ -31,8 +31,7 @@ class Requests(wiring.Signature):
     data : In(16)
         With `done` of a READ: the register.
     absent, outside, refused : In(1)
-        A check since `clear` has found no register or half of a value, a value out of its range, a pulse that the
-        device refuses.
+        A check since `clear` has found no register, half of a value, a value out of range, or a refused pulse.
     """
 
     def __init__(self):

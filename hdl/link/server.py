@@ -24,9 +24,9 @@ class Server(wiring.Component):
     to check it, and once to do it, so nothing is done of a frame that ends in an exception. A frame that reads takes a
     snapshot before the first register.
 
-    Latency: to the first byte of an answer less than 30 clocks, 21 for every register to write, 4 for every register to
-    read, and the register file's times for a snapshot and a commit. Throughput: one frame after the other; a byte of an
-    answer waits for the line.
+    Latency: to the first byte of an answer less than 30 clocks; also 21 for every register to write, 4 for every
+    register to read, and the register file's times for a snapshot and a commit. Throughput: one frame after the other;
+    a byte of an answer waits for the line.
 
     Rounding and overflow: the counters wrap.
 
@@ -47,8 +47,8 @@ class Server(wiring.Component):
     TypeError
         If `design` is not a Design.
 
-    Source: "Modbus Application Protocol Specification V1.1b3", sections 6.3, 6.4, 6.6, 6.8, 6.12, 6.17, 6.21 (the
-    functions) and 7 (the exceptions).
+    Source: "Modbus Application Protocol Specification V1.1b3", sections 6.3, 6.4, 6.6, 6.8, 6.12, 6.17, 6.21
+    (functions) and 7 (exceptions).
     """
 
     def __init__(self, design: Design):
@@ -75,7 +75,7 @@ class Server(wiring.Component):
         return m
 
     def _count(self, m: Module, walk: Walk) -> None:
-        """Add the states that wait for a frame, and that count it: each count leads to what follows it."""
+        """Add the states that wait for a frame and count it; each count leads to the next step."""
         frames, file, function = self.frames, self.file, self.frames.function
         with m.State("IDLE"):
             m.d.sync += [walk.code.eq(0), walk.clearing.eq(0), walk.malformed.eq(0), walk.beat.eq(0)]
@@ -108,7 +108,7 @@ class Server(wiring.Component):
                         walk.send_head(HEAD)
 
     def _begin_phases(self, m: Module, walk: Walk) -> None:
-        """Add the state that begins each phase: check the registers to read, those to write, then write, and read."""
+        """Add the state that begins each phase: check reads, check writes, write, read."""
         file = self.file
         with m.State("PHASE"), m.Switch(walk.phase):
             with m.Case(Operation.CHECK_READ):
@@ -185,7 +185,7 @@ class Server(wiring.Component):
                 m.next = "ASK"
 
     def _do_registers(self, m: Module, walk: Walk) -> None:
-        """Add the states that ask the file for a register after the other, and that finish what was written."""
+        """Add the states that ask the file for one register after another, and that finish a write."""
         file = self.file
         with m.State("ASK"):
             m.d.comb += file.start.eq(1)

@@ -33,7 +33,7 @@ class Receiver(wiring.Component):
     """The bytes on a line that idles high.
 
     Equation: a fall of the line begins a byte; bit k of it, the least significant first, is the line's level k + 3/2
-    bits later, and the stop bit's is taken 9 1/2 bits later. A line that is high again after half a bit was no start.
+    bits later; the stop bit's level is taken 9 1/2 bits later. A line that is high again after half a bit was no start.
 
     Latency: 2 clocks of the synchroniser, then the bits; `arrived` comes at the middle of the stop bit, so the next
     start bit may be early. Throughput: bytes without a pause.
@@ -64,7 +64,7 @@ class Receiver(wiring.Component):
         If `design` is not a Design.
 
     Source: the RTU transmission mode of "Modbus over Serial Line, Specification and Implementation Guide", section
-    2.5.1, with one stop bit and no parity, as USB adapters and hosts have by default.
+    2.5.1; with one stop bit and no parity, as USB adapters and hosts have by default.
     """
 
     def __init__(self, design: Design):

@@ -18,7 +18,7 @@ HEAD, HEAD_OF_OTHERS, ECHOED = 2, 4, 6
 
 
 class Walk:
-    """What a server knows of the frame that it walks through, and the steps that its states take.
+    """A server's place in a frame, and the steps of its states.
 
     Args:
         m: the server's module.
@@ -27,7 +27,7 @@ class Walk:
 
     Attributes:
         reads, writes, single: whether the function reads, writes, and writes one register.
-        index, beat: the place of the byte that is asked for, and the clock of the word that is taken.
+        index, beat: the place of the requested byte, and the clock of the word that is taken.
         word, length: two bytes of the frame, or a register; and the byte of an answer that is its length, or its code.
         taking, got, ending: `word` takes a byte, a register, or the length.
         excepting: the byte to send is the function of an exception.
@@ -37,9 +37,9 @@ class Walk:
         malformed, clearing: the frame is not as it should be; the server clears its counters.
         code, stop: the exception, if any, and how many bytes of the frame are sent back.
         bad: the word is no number of registers that the phase may have.
-        onward, address_given, left_given, own_address, own_left: what `address` and `left` become: those of the next
-            register, of a request, or of this device's own.
-        counter, place, size: one of the counters, and the registers that are this device's own: usually that counter.
+        onward, address_given, left_given, own_address, own_left: the next `address` and `left`: of the next register,
+            of a request, or of the device's own registers.
+        counter, place, size: one of the counters, and the device's own registers: usually that counter.
     """
 
     def __init__(self, m: Module, frames: PureInterface, file: PureInterface):
@@ -108,7 +108,7 @@ class Walk:
             m.d.sync += self.left.eq(Mux(self.onward, self.left - 1, given))
 
     def take(self, last: int) -> None:
-        """Take two bytes, which are in the word at beat 3, or one, which is in its lower half at beat 2."""
+        """Take two bytes, in the word at beat 3, or one byte, in its lower half at beat 2."""
         m, beat = self.m, self.beat
         m.d.comb += self.taking.eq(beat[0] ^ beat[1])
         m.d.sync += beat.eq(beat + 1)

@@ -15,7 +15,7 @@ CALLED = {
     "fall": "downwards past a level",
     "now": "now",
 }
-"""What the triggers are called."""
+"""The names of the triggers on the page."""
 STATES = {
     "IDLE": "",
     "FILLING": "keeps what comes before the trigger",

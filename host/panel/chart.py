@@ -11,7 +11,7 @@ TRACES = (
     ("velocity", "mm/s", "velocity_m_per_s", 1e3, "#2f7d32"),
     ("force", "N", "force_n", 1.0, "#b25500"),
 )
-"""What is drawn: a name, its unit, the array, how many of the unit the SI unit has, and a colour."""
+"""A trace: its name, its unit, the array, the number of these units in the SI unit, and a colour."""
 HEIGHT, GAP, TOP = 25, 6, 3
 """The height of a drawing, the gap between two and above the first, percent of the card."""
 MICROSECONDS_BELOW_S = 1e-3

@@ -1,4 +1,4 @@
-"""What polls a board for all tabs: one thread has its axis, does what they ask for, and keeps what they see."""
+"""The thread that polls a board for all tabs: it has the axis, carries out their wishes, and keeps their samples."""
 
 import math
 import threading
@@ -47,11 +47,11 @@ class Sample(NamedTuple):
 class Driver:
     """The one user of an axis. Tabs ask, and see; nothing that they call waits for the board.
 
-    A wish has a time, that at which its person had it, in s of time.monotonic. One that is `STALE_S` old, or that comes
-    while no board answers, is dropped, and that is said. A disarm is done however old it is.
+    A wish has the time at which its person made it, s of time.monotonic. A wish that is `STALE_S` old, or comes while
+    no board answers, is dropped with a message. A disarm is done however old it is.
 
-    The tab that armed renews the lease, by `ping`. When it is silent for `LEASE_S`, the board is disarmed; and if this
-    thread cannot do that, it cannot renew either, so that the board trips.
+    The tab that armed renews the lease, by `ping`. When it is silent for `LEASE_S`, the board is disarmed. If this
+    thread cannot do that, it cannot renew the lease either, and the board trips.
 
     Args:
         connect: returns an axis; called at the beginning, and again when a tab asks for it.
@@ -89,7 +89,7 @@ class Driver:
     # ---- what tabs call ---------------------------------------------------------------------------------------------
 
     def samples_since(self, number: int) -> tuple[int, list[Sample]]:
-        """Return the number of the next sample, and those from `number` on that are kept."""
+        """Return the number of the next sample, and the kept samples from `number` on."""
         with self._lock:
             new = min(self._taken - number, len(self._samples))
             return self._taken, [self._samples[-place] for place in range(new, 0, -1)]
@@ -176,7 +176,7 @@ class Driver:
         self._see(said=said)
 
     def _obey(self) -> None:
-        """Do what was asked for; what is refused is said for a while."""
+        """Carry out a wish; a refusal is shown for a while."""
         if self.view.said and time.monotonic() - self._said_s > SAID_S:
             self._say("")
         while act := self._wishes.act():
@@ -188,7 +188,7 @@ class Driver:
                 self._try(act.do, act.at_s + DONE_S)
 
     def _try(self, do: Callable[[], None], until_s: float) -> None:
-        """Do something, of which nothing goes out to the board after a time."""
+        """Do something; after a time, nothing of it goes out to the board."""
         self._say("")
         try:
             with self._axis.by(until_s) if self._axis else nullcontext():
@@ -231,7 +231,7 @@ class Driver:
         self._see(**gone, lost=f"{error}", recording=self._recorder.recording)
 
     def _leave_late(self) -> None:
-        """Leave what was begun for a person whose board is silent now: it would end at a time that nobody expects."""
+        """Give up actions in progress when the board is silent: they would end at a time that nobody expects."""
         self._recorder.leave_trigger()
         self.registers.leave()
         self._see(recording=self._recorder.recording)
@@ -243,7 +243,7 @@ class Driver:
         if self._axis is None:
             return
         if not self._lives(tab):
-            raise NotReadyError("the tab that asks to arm is not heard")
+            raise NotReadyError("the tab that asks to arm does not answer")
         self._leave_home()
         self._axis.arm()
         self._see(holder=tab)
@@ -260,7 +260,7 @@ class Driver:
         if trip is None:
             return
         if trip.latched != latched:
-            raise HostError(f"other causes stand than those that were shown: {trip}")
+            raise HostError(f"the causes have changed since they were shown: {trip}")
         self._axis.acknowledge(trip)
 
     def _home(self, tab: str, index_m: float) -> None:
@@ -288,7 +288,7 @@ class Driver:
 
     def _check_holder(self, tab: str) -> None:
         if self.view.holder not in (None, tab):
-            raise NotReadyError("another tab armed the board, and alone may do that")
+            raise NotReadyError("another tab armed the board: only that tab may do this")
 
     def _record(self, tab: str, wish: Wish) -> None:
         self._check_holder(tab)
@@ -304,7 +304,7 @@ class Driver:
         self._see(recording=self._recorder.recording)
 
     def _write(self) -> None:
-        """Write what tabs want, all at one sample; while a tab holds the board, only what that one wants."""
+        """Write the wishes of the tabs, all at one sample; while a tab holds the board, only its own."""
         words, late = self._wishes.words()
         axis = self._axis if self.view.status else None
         if late or (words and axis is None):
@@ -335,7 +335,7 @@ class Driver:
         return time.monotonic() - self._pings.get(tab, -LEASE_S) < LEASE_S
 
     def _live(self, axis: Axis) -> None:
-        """Renew the lease for a ping that is new; disarm when the tab that armed is silent."""
+        """Renew the lease for a new ping; disarm when the tab that armed is silent."""
         holder = self.view.holder
         if holder is None:
             return
@@ -364,7 +364,7 @@ class Driver:
         self._see(status=status, lost="", holder=holder, **measured)
 
     def _look_at_lease(self, axis: Axis) -> None:
-        """See which program may write to a board that is shared; who had the lease may have written words."""
+        """See which program may write to a shared board; a former lease holder may have written words."""
         before, lease = self.view.lease, axis.lease
         if before is not None and lease != before:
             self._keep({name: axis.get(name) for name in self.view.values})

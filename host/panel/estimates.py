@@ -1,4 +1,4 @@
-"""What two velocity estimators make of the same counts, at every sample: bit-accurate models beside the board."""
+"""The velocities of two estimators from the same counts, at every sample: bit-accurate models beside the board."""
 
 import threading
 from collections import deque
@@ -17,7 +17,7 @@ KEPT = 256
 
 
 class _Lane:
-    """An axis that goes on from record to record, with words that may change between two."""
+    """An axis that continues from record to record; its words may change in between."""
 
     def __init__(self, spec: AxisSpec):
         self.spec = spec
@@ -66,7 +66,7 @@ class Estimates:
         self._count_m, self._moved_m = spec.count_m, 0.0
         self._records: deque[bytes] = deque(maxlen=KEPT)
         self._taken, self._lock = 0, threading.Lock()
-        # The first call compiles, for which no tab would wait.
+        # The first call compiles; no tab would wait so long.
         for lane in self._lanes:
             lane.run(np.zeros(1, np.int64))
 
@@ -92,7 +92,7 @@ class Estimates:
             self._records.append(rows.astype("<f4").tobytes())
 
     def since(self, number: int) -> tuple[int, list[bytes]]:
-        """Return the number of the next record, and those from `number` on that are kept.
+        """Return the number of the next record, and the kept records from `number` on.
 
         A record is four successive rows of float32, of one length: the velocities (m/s) of both estimators, then the
         forces (N).

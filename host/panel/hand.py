@@ -5,14 +5,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 SPEED_M_PER_S = 0.4
-"""How fast a hand may move what it holds: a handle that is faster than its encoder would end the simulation."""
+"""The largest speed of a held handle: a handle faster than its encoder would end the simulation."""
 STEP_S = 0.05
 """The longest time between two places of a drag; in a longer one the hand rests."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """Something that a hand may break: the order that breaks it, the one that mends it, and what both are called."""
+    """Something that a hand may break: the orders that break and mend it, and the names of both."""
 
     cut: str
     mend: str
@@ -25,7 +25,7 @@ FAULTS = {
     "stop": Fault("open emergency_stop", "close emergency_stop", "Open the emergency stop", "Close the emergency stop"),
     "clock": Fault("open clock", "close clock", "Stop the clock", "Start the clock"),
 }
-"""What may be broken, by name."""
+"""The parts that a hand may break, by name."""
 
 
 class Hand:
@@ -64,7 +64,7 @@ class Hand:
             self._order("hold free")
 
     def turn(self, name: str) -> None:
-        """Break what is whole, or mend what is broken.
+        """Break a whole part, or mend a broken one.
 
         Raises:
             KeyError: if there is no such fault.

@@ -1,4 +1,4 @@
-"""The card of homing: the position that the index becomes, and what is waited for."""
+"""The card of homing: the position that the index gets, and the state of the wait."""
 
 from nicegui import events, ui
 

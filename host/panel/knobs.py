@@ -11,7 +11,7 @@ from ..words import OF_THE_HEARTBEAT
 
 HIDDEN = ("preload_count", "supervisor_causes", *OF_THE_HEARTBEAT)
 CAPTURE = "capture_"
-"""Words that are no settings of a person at a page, and how the names of those of a capture begin."""
+"""Words that are no settings for a person at a page, and the prefix of the names of a capture's words."""
 UNITS = {
     **{"m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "s": ("ms", 1e3)},
     **{"m/s^2": ("m/s\u00b2", 1.0), "m^(1/2)/s": ("\u221am/s", 1.0)},
@@ -49,11 +49,11 @@ LABELS = {
     "encoder_invert": "Encoder inverted",
     "encoder_glitch_clocks": "Glitch filter, clocks",
 }
-"""What words are called on the page; others are called by their names."""
+"""The names of words on the page; other words keep their own names."""
 
 
 class Group(Enum):
-    """What words are for; the value is the heading."""
+    """The groups of words by purpose; the value is the heading."""
 
     WALL = "Wall"
     ESTIMATOR = "Estimator"
@@ -81,11 +81,11 @@ class Knob:
     """A word as a page shows it.
 
     Attributes:
-        name: the word's name; label: what it is called; group: what it is for.
+        name: the word's name; label: its name on the page; group: its purpose.
         unit: the unit that is shown; scale: how many of it the SI unit has.
         least, most, step: the word's range and its 1, in SI units.
-        way: how a value goes along the slider: `DECADES` for what a hand feels by ratios, `CUBE` for what has a sign,
-            which is fine near 0.
+        way: how a value goes along the slider: `DECADES` for values that a hand feels by ratios; `CUBE` for signed
+            values, fine near 0.
         whole: whether there is nothing between two values.
     """
 
@@ -102,7 +102,7 @@ class Knob:
 
     @property
     def spoken(self) -> str:
-        """What it is called where it cannot be seen beside its unit."""
+        """Its name with the unit, for places without the unit beside it."""
         return f"{self.label}, {self.unit}" if self.unit else self.label
 
     def to_slider(self, value: float) -> float:
@@ -135,18 +135,18 @@ class Knob:
 
 
 class Field:
-    """What stands in a field of a knob, so that what was only looked at is told from a wish."""
+    """The text in a knob's field; it distinguishes a look from a wish."""
 
     def __init__(self, knob: Knob):
         self._knob, self._stands = knob, math.nan
 
     def show(self, value: float) -> float:
-        """Return what an SI value is in the field, with the digits that the field itself keeps when it is left."""
+        """Return the text of an SI value in the field, with as many digits as the field itself keeps."""
         self._stands = float(DIGITS % self._knob.shown(value))
         return self._stands
 
     def takes(self, typed: float | None) -> bool:
-        """Take what was typed: return whether it is a wish, neither nothing nor what stood there."""
+        """Take a typed text; return whether it is a wish: not empty, and other than before."""
         if typed is None or typed == self._stands:
             return False
         self._stands = typed

@@ -1,13 +1,14 @@
-"""The socket between a tab and the board: what must not wait for a page goes by it, the sign that the tab lives first.
+"""The socket between a tab and the board. It carries messages that must not wait for a page, first of all the tab's
+sign of life.
 
 A tab sends objects of JSON with a key `do`: ping, arm, disarm, acknowledge (`latched`), connect, and at a virtual board
 hold (`m`), free and turn (`fault`). While it shows the registers it says so again and again: registers. It gets objects
-with `told`, see `view.told`, when that changed, `samples`, each a list of what a `Sample` has, and `registers`, see
-`register_tree.told`, with their `period_s`; and, as bytes, the records of `Estimates`.
+with these keys: `told` when it changed, see `view.told`; `samples`, each a list of a `Sample`'s values; and `registers`
+with their `period_s`, see `register_tree.told`. As bytes it gets the records of `Estimates`.
 
-Every object has a time `at_s`, s of the server's time.monotonic: of those from the server when it was sent, and of
-those from a tab when its person wished it, by the tab's clock and the last time that it got. So what a slow network or
-a server that hung has kept is known to be old, and is not done.
+Every object has a time `at_s`, s of the server's time.monotonic. The server's objects have the time at which they were
+sent. A tab's objects have the time of their person's wish, by the tab's clock and the last server time that it got. So
+a wish that a slow network or a hung server has delayed is known to be old, and is not carried out.
 """
 
 import asyncio
@@ -36,7 +37,7 @@ WORD_MAX = (1 << 32) - 1
 
 @dataclass(frozen=True)
 class Bench:
-    """What is beside a virtual board.
+    """The tools beside a virtual board.
 
     Attributes:
         hand: the hand at its handle.

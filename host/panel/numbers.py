@@ -1,4 +1,4 @@
-"""Numbers that a browser sends with its events: finite and in a range, for what comes from a socket may be anything."""
+"""Numbers that a browser sends with its events, checked to be finite and in a range: a socket may bring anything."""
 
 import math
 from typing import Any
@@ -8,7 +8,7 @@ from ...model.checks import NUMBERS, check_number, check_range
 MOST = NUMBERS[1]
 """The largest number, either way, that is taken where there is no other range."""
 TIMED, VALUED = "() => emit(window.hardwallNow())", "(value) => emit(value, window.hardwallNow())"
-"""What the page sends of an event: when it was; and of one with a value that, too."""
+"""The page's arguments of an event: its time, and its value if it has one."""
 
 
 def number_of(name: str, value: Any, least: float = -MOST, most: float = MOST) -> float:
@@ -29,7 +29,7 @@ def number_of(name: str, value: Any, least: float = -MOST, most: float = MOST) -
 
 
 def time_from(value: object) -> float:
-    """Return the time of a wish, s of time.monotonic; a page that does not know it sends None, which is too old.
+    """Return the time of a wish, s of time.monotonic; None, from a page that does not know it, counts as too old.
 
     Raises:
         TypeError, FieldError: as `number_of` does.

@@ -1,4 +1,4 @@
-"""What the page is made of: its head, which the socket writes, the drawings, and a knob for every word."""
+"""The content of the page: its head, which the socket fills, the drawings, and a knob for every word."""
 
 import time
 from collections.abc import Callable
@@ -20,7 +20,7 @@ from .register_tree import markup
 STEPS = 1000
 """Places of a slider."""
 TOUCH_S = 0.4
-"""The time after which a knob that was touched is at rest."""
+"""A touched knob is at rest after this time."""
 REFRESH_S = 0.15
 """The time between two looks at what the board uses."""
 HEAD, TRACES, REGISTERS = (
@@ -114,7 +114,7 @@ class _Row:
     Args:
         knob: the word.
         give: takes its new SI value, and when it was wished for.
-        refuse: takes what is wrong with what a browser sent.
+        refuse: takes the fault of a browser's message.
     """
 
     def __init__(self, knob: Knob, give: Callable[[float, float], None], refuse: Callable[[str], None]):
@@ -189,7 +189,7 @@ def _knobs(driver: Driver, tab: str) -> list[_Row]:
 
 
 def _refresher(driver: Driver, rows: list[_Row]) -> Callable[[], None]:
-    """Return what shows the values of the board where they are new, and where they are not what a hand wanted."""
+    """Return a function that shows the board's values where they are new, or differ from a hand's wish."""
     shown: dict[str, int] = {}
 
     def refresh() -> None:

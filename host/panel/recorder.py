@@ -15,7 +15,7 @@ NOW = "now"
 """The trigger that a person gives."""
 TRIGGERS = (*SOURCES, NOW)
 IDLE, READING = "IDLE", "READING"
-"""What a recorder does besides the states of the memory: nothing, and reading it."""
+"""The states of a recorder besides the memory's: idle, and reading it."""
 STATE_S = 0.05
 """The time between two looks at the state of the memory."""
 
@@ -47,7 +47,7 @@ class Wish:
 
 @dataclass(frozen=True)
 class Recording:
-    """What is known of a capture.
+    """The state of a capture.
 
     Attributes:
         state: the state of the memory, or `READING`.
@@ -82,7 +82,7 @@ class Recorder:
         return decimation.low * shortest, decimation.high * shortest
 
     def begin(self, axis: Axis, wish: Wish) -> None:
-        """Begin a capture, whatever was before; the errors are those of `Capture.start`."""
+        """Begin a capture, whatever was before. Errors: see `Capture.start`."""
         least_s, most_s = self.spans_s(axis)
         check_range("span_s", wish.span_s, 0.0, most_s)
         records = axis.capture.records
@@ -138,7 +138,7 @@ class Recorder:
         if state == STATES[DONE]:
             self._reading = axis.capture.reading()
             state = READING
-        # A board that was reset has forgotten what was begun.
+        # A board that was reset has forgotten the capture.
         self._say(state=state)
 
     def _say(self, **changes: Any) -> None:

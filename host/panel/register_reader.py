@@ -57,7 +57,7 @@ class RegisterReader:
         self._line_s = self._took_s = self._began_s = 0.0
 
     def ask(self, at_s: float | None = None) -> None:
-        """Hear that a tab shows the registers, or showed them at a time; what is old is not heard."""
+        """Note that a tab shows the registers, or showed them at a time; old notes are dropped."""
         asked_s = time_of(at_s)
         if is_fresh(asked_s):
             self._asked_s = max(self._asked_s, asked_s)
@@ -67,7 +67,7 @@ class RegisterReader:
         self.reading, self._left = None, []
 
     def step(self, axis: Axis) -> None:
-        """Read one block, if it is due. A block is no longer than what a look at the board reads.
+        """Read one block, if it is due. A block is at most as long as one read of the board.
 
         Raises:
             HostError: if the board is not reached.

@@ -29,7 +29,7 @@ DIGITS = "%.10g"
 
 
 class Block(NamedTuple):
-    """Registers that are beside each other in the map: a heading, what they are, and the registers."""
+    """Adjacent registers of the map: a heading, a description, and the registers."""
 
     heading: str
     about: str
@@ -73,7 +73,7 @@ def ranged(register: Register) -> str:
 
 
 def told(device: Device, words: Mapping[str, int]) -> dict[str, list[str]]:
-    """Return what a tab shows of words: by the names of registers, what each says, and the word itself."""
+    """Return a tab's texts for words: by the names of registers, the meaning of each, and the word itself."""
     registers = {each.name: each for each in (*device.constants, *device.registers.values())}
     return {name: [said(registers[name], word), raw(registers[name], word)] for name, word in words.items()}
 

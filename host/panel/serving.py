@@ -62,9 +62,9 @@ class AddressError(ServerError):
 
 
 class Guard:
-    """Lets only requests through whose path begins with a token, whose Host is that of the page's address, and whose
-    Origin, if they have one, is the page itself; refuses pages and sockets alike. So a page of another site, or a name
-    that another site points here, gets nothing even if the token leaked. What is let through gets `HEADERS`.
+    """Lets a request through under three conditions: its path begins with a token, its Host is the page's address, and
+    its Origin, if it has one, is the page itself. Pages and sockets are refused alike. So a page of another site, or a
+    name that another site points here, gets nothing even if the token leaked. What is let through gets `HEADERS`.
 
     Args:
         inner: the application of ASGI behind it.
@@ -137,7 +137,7 @@ def _with_headers(send: Any) -> Any:
 
 
 class FreshFiles(StaticFiles):
-    """Files that a browser asks for anew: at an address that is kept, those of another version may be in its cache."""
+    """Files that a browser must always ask for: at a kept address, another version's files may be in its cache."""
 
     def file_response(self, *args: Any, **named: Any) -> Response:
         response = super().file_response(*args, **named)
@@ -203,7 +203,7 @@ class PanelServer:
         bench: what is beside a virtual board; None at a real one.
         title: the title of the page.
         at: where it is served; the socket is closed at the end.
-        token: what the address begins with, for who knows it alone.
+        token: the secret beginning of the page's address.
 
     Attributes:
         url: the address of the page, with its token.

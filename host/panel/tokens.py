@@ -6,7 +6,7 @@ Whoever has the token may arm the board. So a token is kept only where it can be
   else may write to. A file that is anything else is not believed: it is removed, and the page has a new address.
 - It is kept only for a page at this machine itself. At another address the token goes through a network without
   encryption, where a listener could learn it, and would then have it for ever.
-- There is a file a port, for an address of a page names its port.
+- There is one file per port, because a page's address names its port.
 """
 
 import ipaddress
@@ -22,9 +22,9 @@ from ...model.runtime.whole_file import whole_file
 
 BITS = 128
 FORM = re.compile(r"[A-Za-z0-9_-]{22}")
-"""What a token of so many bits looks like."""
+"""The form of a token of so many bits."""
 OTHERS, OTHERS_WRITE = 0o077, 0o022
-"""The bits of a mode by which others may do anything, and those by which they may write."""
+"""The mode bits that give others any access, and the mode bits that let others write."""
 
 
 class Token(NamedTuple):
@@ -33,7 +33,7 @@ class Token(NamedTuple):
     Attributes:
         text: the token.
         file: where it is kept for the next start; None if it is of this start only.
-        note: why it is not kept, or not the one that was kept; empty if it is as expected.
+        note: why it is not kept, or is not the kept one; empty if it is as expected.
     """
 
     text: str
@@ -42,7 +42,7 @@ class Token(NamedTuple):
 
     @property
     def about(self) -> str:
-        """What a person at the page must know of its address."""
+        """The text on the page about its address."""
         if self.file is None:
             return "This address ends with this program: the next start has another one."
         return (
@@ -65,7 +65,7 @@ def is_of_this_machine(address: str) -> bool:
 
 
 def kept_token(port: int, renew: bool = False) -> Token:
-    """Return the token that is kept for a port, or a new one that is kept from now on.
+    """Return the token kept for a port, or a new one, kept from now on.
 
     A folder that cannot be had, or is not the user's alone, is no error: the token is of this start only, and `note`
     says why.

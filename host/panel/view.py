@@ -1,4 +1,4 @@
-"""What is known of a board at a moment, and the words in which a page says it: what, why, and what to do."""
+"""The state of a board at a moment, and a page's words for it: what, why, and what to do."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -25,19 +25,19 @@ ADVICE = {
     "external_fault": "Close the amplifier's fault loop",
     "emergency_stop": "Make sure that all is safe, and close the loop of the emergency stop",
 }
-"""What helps against a cause, by its name."""
+"""The remedy for a cause, by its name."""
 
 
 @dataclass(frozen=True)
 class View:
-    """What is known of a board.
+    """The state of a board.
 
     Attributes:
         device: what the board says of itself; None before the first connection.
         status: what it does; None while it is not reached.
         connected: whether the port is open; lost: why the board is not reached.
         holder: the tab that armed it; None if none did.
-        lease: the program that holds the lease of a board that is shared, empty if none does; None if it is not shared.
+        lease: the program that holds the lease of a shared board, empty if none does; None if the board is not shared.
         said: why the last act had no effect; empty if it had.
         pace: seconds of the board in a second; None while it is not known.
         looks_hz: how often the board is read.
@@ -68,8 +68,8 @@ class View:
 def told(view: View, tab: str) -> dict[str, Any]:
     """Return what a tab is told of a view, as JSON takes it.
 
-    `state`, `why` and `do` are texts; `may` has the acts that have a meaning now; `latched` is the word of the causes
-    that the tab shows, and acknowledges.
+    `state`, `why` and `do` are texts. `may` has the actions possible now. `latched` is the word of the causes that the
+    tab shows and acknowledges.
     """
     state, why, do = _words(view, tab)
     status = view.status

@@ -1,4 +1,5 @@
-"""What tabs wish of a board, until it is done or too old: nothing that a person has waited for in vain is done late."""
+"""The wishes of tabs, until they are carried out or too old: no wish is carried out late, after a person has given
+up."""
 
 import math
 import threading
@@ -67,7 +68,7 @@ class Wishes:
         return self._acts.popleft() if self._acts else None
 
     def words(self) -> tuple[dict[str, Word], int]:
-        """Take all words by their names: those that are not too old, and how many are."""
+        """Take all words by their names: the ones that are not too old, and the number of the others."""
         with self._lock:
             words, self._words = self._words, {}
         fresh = {name: word for name, word in words.items() if is_fresh(word.at_s)}

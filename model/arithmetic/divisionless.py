@@ -6,8 +6,8 @@ With the divisor t of w bits, and both operands shifted until t's top bit is 1, 
     e = 1 - t r                                 what is left of 1, 0 < e <= ERROR_MAX
     q <- q + d,  R <- B**j (R - t r d)          d: the leading digit of R in base B; R is r x to begin with
 
-r x / (r t) is x / t whatever r is, so the rounding of r costs no accuracy: it must be small enough, and never above
-1 / t, for that t r is a little below 1 and the leading digit of R is that of the quotient. R - d t r is R's fraction
+r x / (r t) is x / t whatever r is, so the rounding of r costs no accuracy. r must only be slightly below 1 / t, and
+never above it. Then t r is a little below 1, and the leading digit of R is the quotient's. R - d t r is R's fraction
 and d e: a product of a digit and of a word of about w bits. What a division finds bit by bit, a product finds DIGIT
 bits at a time. At the end R is compared with r t, and q is one more if R is not less.
 
@@ -16,8 +16,8 @@ rounded to TABLE bits behind the first. 2 - s is rounded down to STEP bits and t
 
     0 < e <= (1 - s)**2 + s 2**-STEP + t 2**-FINE <= ERROR_MAX = 2**-(DIGIT + 1)       `reciprocal_error`
 
-R stays below 2: a digit has DIGIT + 1 bits, the first of which goes up into the digits before it, and the next R is
-below 1 + 2**(DIGIT + 1) e <= 2. So R is below twice r t at the end, and q is one too small at most: q is exact.
+R stays below 2. A digit has DIGIT + 1 bits, and its first bit carries into earlier digits. So the next R is below 1 +
+2**(DIGIT + 1) e <= 2. So R is below twice r t at the end, and q is one too small at most: q is exact.
 
 Source: Newton's method for a reciprocal, and digits of a quotient by a reciprocal in a high base with what remains, are
 textbook arithmetic.
@@ -26,7 +26,7 @@ textbook arithmetic.
 from ..runtime.compiled import compiled
 
 INDEX = 5
-"""Bits of the divisor by which the table is read, those after its first 1."""
+"""Bits of the divisor, after its first 1, that address the table."""
 TABLE = 6
 """Bits behind the first of an entry of the table."""
 STEP = 13
@@ -84,8 +84,8 @@ def passes(divisor_width: int, factor_width: int) -> int:
 def latency(divisor_width: int, quotient_width: int, factor_width: int = 1) -> int:
     """Return the clocks from `start` to `done` of the hardware.
 
-    One clock loads the operands, two make each shift of them, five make the reciprocal and multiply both operands by
-    it, and two make each digit.
+    One clock loads the operands, and two make each shift of them. Five make the reciprocal and multiply both operands
+    by it. Two make each digit.
     """
     return 6 + 2 * passes(divisor_width, factor_width) + 2 * digits(quotient_width + 1)[0]
 

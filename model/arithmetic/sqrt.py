@@ -9,8 +9,8 @@ from ..runtime.compiled import compiled
 def isqrt(radicand):
     """Return floor(sqrt(radicand)) for 0 <= radicand < 2**62, exactly.
 
-    The float64 root of a 62-bit integer is within one of the answer (its relative error is at most 2**-53, and the
-    root has at most 31 bits), so one comparison each way makes it exact.
+    The float64 root of a 62-bit integer is within one of the answer: its relative error is at most 2**-53, and the root
+    has at most 31 bits. So one comparison each way makes it exact.
     """
     root = int(math.sqrt(radicand))
     if root * root > radicand:

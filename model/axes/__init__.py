@@ -1,1 +1,1 @@
-"""Several axes: what they share, and what differs from an axis alone."""
+"""Several axes in one pipeline: their shared parts, and the differences from a single axis."""

@@ -2,7 +2,8 @@
 
 Every axis equals a single one (`axis`) with its words, sample for sample. All sample at one rate, in turn: in a rota of
 `clocks_per_sample` clocks, clock i takes a sample of axis i. A rota has at least `slots` clocks: one for every axis,
-and no fewer than the recurrence, the clocks until what a sample leaves to the next one of its axis is kept.
+and no fewer than the recurrence. The recurrence is the clocks until the state that a sample leaves for the next sample
+of its axis is stored.
 
 The latency from a sample to its drive may exceed the rota: several samples of an axis are then under way at once.
 
@@ -75,8 +76,8 @@ class AxesSpec(DesignedAxis):
     Attributes:
         axes: the number of axes, 1 to `AXES_MAX`.
 
-    The other attributes are those of `designed.DesignedAxis`, and the errors those of `requirements.AxisRequirements`.
-    The estimator is one of `PIPELINES`; the words of an axis may say other gains.
+    The other attributes are in `designed.DesignedAxis`, the errors in `requirements.AxisRequirements`. The estimator is
+    one of `PIPELINES`; the words of an axis may say other gains.
     """
 
     axes: int
@@ -85,9 +86,9 @@ class AxesSpec(DesignedAxis):
         check_int("axes", self.axes, 1, AXES_MAX)
         super().__post_init__()
         if self.passivity:
-            raise FieldError("passivity", "must be False, for axes that share their logic have no such controller")
+            raise FieldError("passivity", "must be False: axes that share their logic have no such controller")
         if self.coupling:
-            raise FieldError("coupling", "must be False, for axes that share their logic have no moving surfaces")
+            raise FieldError("coupling", "must be False: axes that share their logic have no moving surfaces")
         if self.estimator not in PIPELINES:
             raise FieldError("estimator", f"must be one of {', '.join(PIPELINES)}, not {self.estimator!r}")
         if self.clocks_per_sample < self.slots:
@@ -167,9 +168,9 @@ class Axes:
 
         Args:
             counts: integers, shape (axes, samples). A count may exceed the count's width: it wraps, as in the hardware,
-                and from there on the flag count_wrapped is up and the drive is zero. A count that goes by more in a
-                sample than the sample has clocks raises the encoder's flag of an illegal step in the same way. It may
-                not jump by half of its range.
+                and from there on the flag count_wrapped is up and the drive is zero. If a count changes by more than
+                the clocks of a sample, the encoder's flag of an illegal step is up in the same way. It may not jump by
+                half of its range.
 
         Raises:
             TypeError: if the counts are not integers.

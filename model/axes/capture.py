@@ -1,12 +1,12 @@
 """The capture memory of several axes: `capture` for one of them at a time; twin of `hardwall.hdl.axes.capture`.
 
-There is one memory for all axes. A `capture_start` takes the axis that the word `capture_axis` has then; until the next
-start the memory sees that one alone, whatever becomes of the word.
+There is one memory for all axes. A `capture_start` selects the axis in the word `capture_axis`. Until the next start
+the memory sees only this axis, even if the word changes.
 
-What the axes show of a sample comes at two clocks: the record has all but the state and the drive that is let out,
-which come with the turn. Both are kept until those of the axis's next sample, and the memory hears of the sample
-`SAMPLED` clocks behind its record. So every value of a record in the memory is of one sample, and triggers are found as
-for an axis alone, but that a trip comes with a turn.
+The values of a sample come at two clocks. Its record has all of them except the state and the limited drive. These two
+come with the axis's turn. Both are kept until the axis's next sample. The memory takes the sample `SAMPLED` clocks
+after its record. So every value of a record in the memory is of one sample. Triggers are found as for a single axis,
+except that a trip comes with a turn.
 
 The pulses come to the memory `PULSED` clocks late: a sample of the axis before, which may be on its way, comes with the
 start at the latest, and does not count.
@@ -26,9 +26,9 @@ from ..words import Word
 from .axis import AxesSpec
 
 SAMPLED = 2
-"""Clocks from a record of the axis to the one in which the memory hears of its sample."""
+"""Clocks from a record of the axis to the clock at which the memory takes its sample."""
 PULSED = 2
-"""Clocks from a pulse of the host to the one in which the memory hears of it."""
+"""Clocks from a pulse of the host to the clock at which the memory takes it."""
 ROTA_LEAST = RECORD_REGISTERS + 1
 """The fewest clocks of a rota with a capture memory: the ring is frozen a clock behind its last record."""
 
@@ -59,7 +59,7 @@ class Inputs(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What is kept of the axis's last sample."""
+    """The values kept of the axis's last sample."""
 
     count: int = 0  # type: ignore[assignment]  # a tuple has a method of this name
     velocity: int = 0
@@ -81,7 +81,7 @@ class State(NamedTuple):
 
 
 class Design(capture.Design):
-    """Formats and run-time words of the capture memory of several axes; the attributes are those of `capture.Design`.
+    """Formats and run-time words of the capture memory of several axes; the attributes are as of `capture.Design`.
 
     Args:
         spec: the axes.

@@ -12,7 +12,7 @@ from . import axis as axes
 
 
 class Samples(NamedTuple):
-    """What every sample of an axis becomes: int64 arrays. The record of a sample has the first six."""
+    """The outputs for every sample of an axis: int64 arrays. The record of a sample has the first six."""
 
     count: np.ndarray  # type: ignore[assignment]  # a tuple has a method of this name
     velocity: np.ndarray

@@ -1,7 +1,7 @@
-"""Monitors that look once a sample: what is wrong with one of several axes; twin of `hardwall.hdl.axes.monitors`.
+"""The monitors of one of several axes, which look once a sample; twin of `hardwall.hdl.axes.monitors`.
 
-One `step` is one sample. The causes, their thresholds and the warning are those of `monitors`, which looks at every
-clock. This is what differs, and what is lost by it:
+One `step` is one sample. The causes, their thresholds and the warning are as in `monitors`, which looks at every clock.
+The differences, and what they cost:
 
     position_range,       of the counts that the samples took. An excursion between two samples is not seen, nor does
     position_wrap         the wall see it. Both limits are compared in every sample.
@@ -47,7 +47,7 @@ class Params(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What an axis shows of a sample, and its words."""
+    """An axis's outputs for a sample, and its words."""
 
     count: int = 0  # type: ignore[assignment]  # a tuple has a method of this name
     fresh: int = 0  # the count was preloaded since the last sample, or there was none

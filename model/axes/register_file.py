@@ -1,14 +1,14 @@
 """The registers of several axes as hardware holds them: a bank of cells an axis, and one snapshot for whoever reads.
 
-The cells of a bank are those that `register_file` has for an axis alone, without the areas that say what may be
-written: these there are once, for all banks have the same words. A written word stays in its cell until a commit in its
-bank; then every written word of the bank becomes active and goes, by its number, to the axis, and the pulses of the
-frame go out at one clock. A live word goes to its axis as soon as its lower half is written.
+A bank has the same cells as the `register_file` of a single axis, except the areas with the accepted ranges: these
+exist once, because all banks have the same words. A written word stays in its cell until a commit in its bank. Then
+every written word of the bank becomes active and goes, by its number, to the axis. The pulses of the frame go out at
+one clock. A live word goes to its axis as soon as its lower half is written.
 
-The status of the axes is not in cells. A snapshot takes one axis's: all that its next sample shows, and all that its
-supervisor shows of that sample. The stamps of edges, which are remembered here, are those of the last edges that the
-sample's count has, each 0 until there was one. Every value of a frame is so of one sample, which was taken when the
-pulses of every frame before it, and of its own, had acted.
+The status of the axes is not in cells. A snapshot takes the status of one axis: of its next sample, and of its
+supervisor at that sample. The stamps of edges are remembered here: the stamps of the last edges in the sample's count,
+each 0 until there is one. So every value of a frame is of one sample. The sample comes after the pulses of all frames
+before, and of the frame itself, have acted.
 
 No frame can write to two banks, and none can read the status of two: between them lies what cannot be written, and more
 than a frame can read.
@@ -27,7 +27,7 @@ def _half(place: int) -> int:
 
 
 class Design(register_file.Design):
-    """What the register file of a map of several axes holds; the attributes are those of `register_file.Design`, and:
+    """The content of the register file for a map of several axes. The attributes are as of `register_file.Design`, and:
 
     Attributes:
         registers: the map.
@@ -78,7 +78,7 @@ class Design(register_file.Design):
         return self.in_banks(address) and TELEMETRY <= address % BANK < COUNTERS
 
     def reset_of(self, bank: int, place: int) -> int:
-        """Return what the cell of a bank is after a reset: what there is once is in the bank of axis 0."""
+        """Return the value of a bank's cell after a reset; registers that exist once are in the bank of axis 0."""
         once = place < TELEMETRY or place in self.own_places
         return 0 if bank and once else self.book[register_file.Area.RESET * END + place]
 
@@ -88,7 +88,7 @@ class BankedFile(register_file.RegisterFile):
 
     Attributes:
         live: the cells, a bank behind the other.
-        pulses: names of the pulses that went out at the last FINISH, and `bank`, the axis that they were for.
+        pulses: names of the pulses that went out at the last FINISH; `bank`: the axis to which they went.
         writes: every word that was written to an axis since the list was emptied: axis, number, word.
         preload_count, acknowledged: what came with the last pulses.
         active: the live words that there are once for all axes, as the host wrote them last, by name.
@@ -109,7 +109,7 @@ class BankedFile(register_file.RegisterFile):
         self._shown = [0] * BANK
 
     def clear(self) -> None:
-        """Forget what the checks have found, and whose status was asked for."""
+        """Forget the results of the checks, and the axis whose status was asked for."""
         super().clear()
         self.asked: int | None = None
 

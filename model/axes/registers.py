@@ -1,16 +1,15 @@
 """The registers of several axes: for each of them a bank with the registers of an axis alone.
 
-The bank of axis k begins at k times 0x0100, and a register of it is as far from there as the same register of a single
-axis is from 0 (`hardwall.model.axis.registers`, which describes both). So what a host knows of one axis it knows of
-each.
+The bank of axis k begins at k times 0x0100. A register has the same offset in its bank as in the map of a single axis
+(`hardwall.model.axis.registers` describes both). So what a host knows of one axis it knows of each.
 
 What there is once for all axes is in the bank of axis 0, and reads 0 in the others, where it cannot be written:
 
 - the constants, to which `axes` is added;
 - the counters of the link;
 - `heartbeat` and `supervisor_watchdog`, for there is one host;
-- the words and pulses of the capture memory, of which there is one (`hardwall.model.axes.capture`), with the word
-  `capture_axis` in addition. Its state can be read in every bank.
+- the words and pulses of the one capture memory (`hardwall.model.axes.capture`), and the word `capture_axis`. Its state
+  can be read in every bank.
 
 The map that the device carries in its window has the registers of axis 0, and the number of banks.
 """
@@ -28,11 +27,11 @@ from .capture import Design as Capture
 from .supervised import Design
 
 OF_THE_HOST = "heartbeat", "supervisor_watchdog"
-"""Live words that there are once, for there is one host."""
+"""Live words that exist once, because there is one host."""
 OF_CAPTURE = "capture_"
 """How the names of what there is of the capture memory begin."""
 BANK = END
-"""The addresses from the bank of an axis to that of the next one."""
+"""The addresses from one bank to the next."""
 
 
 def is_shared(register: Register) -> bool:
@@ -43,18 +42,18 @@ def is_shared(register: Register) -> bool:
 
 
 class AxesMap(RegisterMap):
-    """The registers of supervised axes: those of axis 0, placed, which every other axis has in a bank of its own.
+    """The registers of supervised axes: axis 0's, with their addresses. Every other axis has the same in its own bank.
 
     Args:
         spec: the axes.
         capture_registers: registers of the capture memory, 8 for each of its records; 0 for none. If it is not given:
-            those of a board, or none where a rota is shorter than a record.
+            as many as a board has, or none where a rota is shorter than a record.
 
     Attributes:
         spec: as given.
         banks: the number of banks, one for each axis.
 
-    The other attributes are those of `RegisterMap`, for the bank of axis 0.
+    The other attributes are as of `RegisterMap`, for the bank of axis 0.
 
     Raises:
         TypeError: if `spec` is not an AxesSpec.
@@ -73,7 +72,7 @@ class AxesMap(RegisterMap):
         records = records_in(capture_registers)
         self.capture_registers, self.capture = capture_registers, Capture(spec, records) if records else None
         design = Design(spec)
-        # The same words in the same order as those of a single axis: the watchdog is among them.
+        # The same words in the same order as for a single axis; the watchdog is among them.
         live = (*design.supervisor.words, *design.monitors.words, design.live[-1])
         known = registers_of(spec, live)
         self._describe((*known, *(self.capture.registers() if self.capture else ())), design.committed)

@@ -1,8 +1,8 @@
 """Several axes with their supervisors, which take turns as the axes do; twin of `hardwall.hdl.axes.supervised`.
 
-Every axis has a supervisor of its own. It acts once a sample, in the axis's turn: the turn of a sample is one clock of
-`supervisor`, in which the monitors have seen that sample and the drive is that which the output stage made of it. What
-the pins, the host and the decoder did since the last turn has waited for it. So one `step` is one turn of one axis.
+Every axis has a supervisor of its own. It acts once a sample, in the axis's turn. The turn of a sample is one clock of
+`supervisor`. The monitors have then seen the sample, and the drive is the output stage's for it. What the pins, the
+host and the decoder did since the last turn has waited for it. So one `step` is one turn of one axis.
 
 What must act at once does so between the turns: see the hardware. The host, its heartbeat and its watchdog are one for
 all axes.
@@ -31,7 +31,7 @@ LET_OUT = 3
 
 
 class Turn(NamedTuple):
-    """What the supervisor of an axis sees in a turn: what there was since the last one, and its words."""
+    """The inputs of an axis's supervisor in a turn: the events since the last turn, and its words."""
 
     seen: sampled_monitors.Inputs
     drive: int = 0  # what the output stage asks for, force LSB
@@ -60,7 +60,7 @@ class State(NamedTuple):
 
 
 class Params(NamedTuple):
-    """What is fixed for a design."""
+    """The constants of a design."""
 
     monitors: sampled_monitors.Params
     supervisor: supervisor.Params
@@ -76,7 +76,7 @@ class Design:
         spec: the axes.
         monitors, supervisor, watchdog: the designs of the parts.
         live: words of an axis that act in its next turn, without a commit.
-        words: every word by its number; the host cannot write those of `FIXED`.
+        words: every word by its number; the host cannot write the words of `FIXED`.
         ranges: the least and the largest of the words of the supervisor that may not have every value of their formats.
         params: the parameters of `step`.
     """
@@ -95,7 +95,7 @@ class Design:
 
     @property
     def committed(self) -> tuple[Word, ...]:
-        """Words that a host may write and that take effect together, at a sample after a commit."""
+        """Words that a host may write; they take effect together, at a sample after a commit."""
         return tuple(word for word in self.spec.design.words if word.name not in FIXED)
 
     @property
@@ -105,7 +105,7 @@ class Design:
 
     @property
     def index_bits(self) -> int:
-        """Bits of the count at an index edge that tell, beside a later count within a rota, what it was."""
+        """Bits of the count at an index edge that are enough to restore it from a later count within a rota."""
         return min(self.spec.clocks_per_sample.bit_length() + 1, self.spec.count_width)
 
     @property
@@ -120,7 +120,8 @@ class Design:
 
     @property
     def trip_clocks(self) -> int:
-        """The most clock edges from the first that sees what waits for a turn to a drive of zero, both included."""
+        """The most clock edges from the first one that sees a cause which waits for its turn, to a drive of zero; both
+        included."""
         return self.spec.clocks_per_sample + self.turn_clocks
 
 

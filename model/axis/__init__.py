@@ -1,4 +1,4 @@
-"""One axis; its names here are those that stay."""
+"""One axis. The names that this package exports keep their meaning: see *Limits* in the documentation."""
 
 from .axis import Axis, step
 

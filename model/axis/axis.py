@@ -69,7 +69,7 @@ class Record:
     """The response of an axis to a record of counts, as arrays of the same shape as the counts.
 
     Attributes:
-        velocity: words of `design.estimator.velocity`; counts a sample if the axis is float64.
+        velocity: words of `design.estimator.velocity`; or counts a sample (float64) if the axis is floating.
         force, drive: force on the handle, force LSB: the wall's, and behind the output stage.
         flags: sticky flags after every sample, bits as in `design.flags`.
     """
@@ -124,15 +124,15 @@ class Axis:
         """Run records of counts from the start state.
 
         Args:
-            counts: integers, shape (samples,), or (lanes, samples) for independent axes side by side. A count may
-                exceed the count's width: it wraps, as in the hardware, and from there on the flag count_wrapped is up
-                and the drive is zero. A count that goes by more in a sample than the sample has clocks raises the
-                encoder's flag of an illegal step in the same way. It may not jump by half of its range.
+            counts: integers, shape (samples,), or (lanes, samples) for independent axes side by side. If a count
+                exceeds its width it wraps, as in the hardware: from there on the flag count_wrapped is up and the drive
+                is zero. If a count changes by more than the clocks of a sample, the flag of an illegal step is up in
+                the same way. A count may not jump by half of its range.
 
         Raises:
             TypeError: if the counts are not integers.
-            ValueError: if the counts do not have one or two dimensions, or jump; or if the estimator also needs the
-                stamps of edges, which `hardwall.model.stamped.run` has.
+            ValueError: if the counts do not have one or two dimensions, or jump; or if the estimator needs stamps of
+                edges: then use `hardwall.model.stamped.run`.
         """
         if self.design.estimator.uses_stamps():
             raise ValueError(

@@ -13,7 +13,7 @@ high register first, and two single registers.
 The registers are written by one a clock, and a value as it is when its low register is: no value is torn. They are
 in the order of time when they are read: the window begins with the oldest record, wherever in the ring that is.
 
-The states, of which all but the first and the last take a record of every `capture_decimation`-th sample:
+The states; all but the first and the last take a record of every `capture_decimation`-th sample:
 
     IDLE       until the first start
     FILLING    fewer records are kept than are wanted before the trigger
@@ -21,15 +21,15 @@ The states, of which all but the first and the last take a record of every `capt
     TRIGGERED  all records are kept until the ring is full
     DONE       the ring is full, and frozen until the next start
 
-A trigger is taken in FILLING too, for what comes early is not to be lost: then fewer records are before it, and more
-behind it. When the capture is DONE every record of the ring is of this capture, `capture_place` of them before the
-trigger; the record at that place is the one that was being taken, or else the next.
+A trigger is taken in FILLING too, so that an early one is not lost: then fewer records are before it, and more behind
+it. When the capture is DONE every record of the ring belongs to it, `capture_place` of them before the trigger. The
+record at that place is the one taken at the trigger, or else the next.
 
-Triggers are the host's `capture_trigger`, and those that `capture_sources` has of `SOURCES`. A trip counts at its
-clock; the others are found from one sample to the next, of which both are behind the start, with the count, the force
-and the level as they are a clock before a sample's changed drive. What comes with the
-start belongs to the new capture. Samples that follow each other too closely are refused: a value would be the next
-sample's before it is written.
+The triggers are the host's `capture_trigger`, and the `SOURCES` whose bits are set in `capture_sources`. A trip counts
+at its clock. The other triggers are found by comparing one sample with the next. Both samples come after the start;
+count, force and level are taken a clock before a sample's changed drive. What comes with the start belongs to the new
+capture. Samples that follow each other too closely are refused: a value would be the next sample's before it is
+written.
 """
 
 from typing import NamedTuple
@@ -53,17 +53,16 @@ RECORDS = 2048
 IDLE, FILLING, WAITING, TRIGGERED, DONE = range(5)
 STATES = ("IDLE", "FILLING", "WAITING", "TRIGGERED", "DONE")
 SOURCES = ("contact", "trip", "rise", "fall")
-"""What triggers: the wall's force becomes non-zero, the supervisor trips, the count passes the level up, or down."""
+"""The triggers: the wall's force becomes non-zero, the supervisor trips, the count passes the level up, or down."""
 STATE_FLAGS = ("armed", "tripped", "contact", "live")
 """The lowest flags of a record: the state of the supervisor, a force of the wall, a heartbeat that is not overdue."""
 DECIMATION_BITS = 12
 TAKEN_AT = {"count": 0, "velocity": 2, "driven": 4, "flags": 6}
-"""Clocks from the changed drive to the one at which a record's value is taken, which is when its low register is
-written."""
+"""Clocks from the changed drive to the clock at which a record's value is taken and its low register written."""
 
 
 class Params(NamedTuple):
-    """What is fixed for a design: the records of the ring."""
+    """The constants of a design: the records of the ring."""
 
     records: int
 
@@ -136,8 +135,7 @@ class Design:
         flags: names of a record's flags, bit 0 first.
         stamp_clocks: clocks from a sample to the stamp of its record.
         words: run-time words; all act at the next clock.
-        ranges: the least and the largest of those that may not have every value of their formats; None for the
-            format's.
+        ranges: the least and the largest value of a word whose range is smaller than its format's; None: the format's.
 
     Raises:
         TypeError: if `records` is not an int.
@@ -171,7 +169,7 @@ class Design:
 
     @property
     def sampled_clocks(self) -> int:
-        """Clocks from a sample to the one in which the memory hears of it, which is that of the changed drive."""
+        """Clocks from a sample to the clock of its changed drive, at which the memory takes it."""
         return self.spec.design.latency_to_drive
 
     @property
@@ -184,7 +182,7 @@ class Design:
         return max(behind + TAKEN_AT["velocity"] + 1, axis.force_to_drive + TAKEN_AT["flags"] + 1, RECORD_REGISTERS + 1)
 
     def registers(self) -> tuple[Register, ...]:
-        """Return what a host sees of the capture memory, but for its window, and what it asks of it, as registers."""
+        """Return the host's registers of the capture memory, status and pulses, without its window."""
         states = ", ".join(f"{number} {name}" for number, name in enumerate(STATES))
         stamp = UQ(self.spec.stamp_width, 0)
         pulses = (
@@ -251,7 +249,7 @@ def _triggered(state, inputs):
 
 @compiled
 def _recorded(params, memory, state, inputs):
-    """Write what is due of a record; return how many of its registers are written, the upper half that waits, and data.
+    """Write the register of a record that is due; return the number written, the waiting upper half, and the data.
 
     The data change where the capture is done, with every clock.
     """

@@ -49,7 +49,7 @@ class Outputs(NamedTuple):
 
 
 class UnderWay(NamedTuple):
-    """A sample from its strobe to its changed drive, for which its words are kept."""
+    """A sample between its strobe and its changed drive; its words are kept so long."""
 
     sampled_count: int
     restart: int
@@ -61,7 +61,7 @@ class UnderWay(NamedTuple):
 
 
 class State(NamedTuple):
-    """The states of decoder and axis, and what is under way; of two samples, `older` is the one that came first."""
+    """The states of decoder and axis, and the samples under way; of two samples, `older` came first."""
 
     decoder: quadrature.State
     axis: design.State  # the estimator's after the last strobe; the others' after the last changed drive

@@ -57,7 +57,7 @@ def strobe_of(timing, k):
 
 @compiled
 def change_of(timing, k):
-    """Return the number of the clock at which the drive has changed to that of sample k."""
+    """Return the number of the clock at which the drive is sample k's."""
     return strobe_of(timing, k) + timing.latency
 
 
@@ -73,10 +73,10 @@ def overlap_of(timing):
 class Design:
     """Formats, run-time words and latencies of an axis, derived from its requirements and the choice of an estimator.
 
-    A sample may begin before the drive of the last one has changed. `interval` is then that of the slowest block, and
-    so long that the next velocity comes after the changed drive: what is read with a drive is all of its sample. Since
-    no interval of an estimator is below its latency, both together are more than `latency_to_drive`: a drive changes
-    before the second next strobe.
+    A sample may begin before the drive of the last one has changed. `interval` is then the slowest block's, and long
+    enough for the next velocity to come after the changed drive. So everything that is read with a drive belongs to the
+    drive's sample. Since no interval of an estimator is below its latency, both together are more than
+    `latency_to_drive`: a drive changes before the second next strobe.
 
     Args:
         requirements: the axis's `AxisRequirements`.
@@ -88,11 +88,11 @@ class Design:
     Attributes:
         decoder: the decoder's `quadrature.Params`.
         estimator, wall, output: the designs of the other blocks.
-        passivity: that of the passivity observer and controller; None without.
+        passivity: the design of the passivity observer and controller; None without one.
         words: every run-time word, in the order of the hardware's ports.
         flags: names of the sticky flags, bit 0 first.
         latency_to_drive: clocks from the sample strobe to the changed drive.
-        force_to_drive: those of them from the wall's force on.
+        force_to_drive: the flags from the wall's force on.
         interval: the fewest clocks from a sample strobe to the next.
         timing: the `Timing` of the axis alone, whose first sample ends the first `clocks_per_sample` clocks.
     """

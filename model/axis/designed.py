@@ -11,7 +11,7 @@ from ..requirements import EDGE_ERROR_COUNTS, AxisRequirements
 from .design import Design
 
 USUAL = {"jerk_max_m_per_s3": None, "edge_error_max_counts": EDGE_ERROR_COUNTS, "passivity": False, "coupling": False}
-"""What is no fact of an axis unless it is another than this."""
+"""Fields that are facts of an axis only if they differ from these defaults."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,7 +24,7 @@ class DesignedAxis(AxisRequirements):
         passivity: whether a passivity observer and controller follow the wall: see `passivity`.
         coupling: whether the wall can be a virtual coupling, whose surface moves and holds on both sides: see `wall`.
 
-    The other attributes, and the errors, are those of `requirements.AxisRequirements`.
+    The other attributes and the errors are in `requirements.AxisRequirements`.
     """
 
     estimator: str = "levant"
@@ -46,7 +46,7 @@ class DesignedAxis(AxisRequirements):
 
     @property
     def facts(self) -> dict[str, Any]:
-        """Every field by name, with the gains that are in use; without those that are the usual ones."""
+        """Every field by name, with the gains in use; optional fields with their default are left out."""
         facts = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         for name, usual in USUAL.items():
             if facts[name] == usual:

@@ -44,7 +44,7 @@ MADE = (
 )  # fmt: skip
 """The causes that are made here; the others come from the decoder, the axis, the pins and the host."""
 CLOCKS = {"position_range": 2, "runaway": 2, "estimator_saturated": 2, "index_spacing": 2}
-"""Clocks of the causes that are not found in one: limits are compared in turn, or what has been counted before."""
+"""Clocks of the causes that take more than one: their limits or counters are compared in turn."""
 SATURATED_S = 0.01
 IDLE_EDGES = 100
 """Edges of one channel in a row that raise the warning: so many reversals on one edge are dither, or a dead channel."""

@@ -22,7 +22,7 @@ LATENCY = 1
 INTERVAL = 2
 """Clocks from a strobe to the next, at least."""
 AHEAD = 2
-"""Clocks from the one at which the hardware takes the limits to the strobe of the first force that they limit."""
+"""Clocks from the hardware's taking of the limits to the strobe of the first force that they limit."""
 
 
 class Params(NamedTuple):

@@ -5,15 +5,16 @@ the position of the handle at a sample that is a product, without a velocity:
 
     energy <- energy - drive (position - last position)      drive: the one that answers the last sample
 
-The position is known better than a count. A sample at which the count has gone by one has seen one edge, and the
-handle is there still: at the lower end of its count if that has gone up, at the upper end if down. After several edges
-in a sample it is somewhere in its count, whose middle is taken. So what is asked of an ideal wall of any stiffness, at
-any speed of one edge a sample and below, is exactly nothing: a handle that shakes about an edge goes nowhere.
+The position is known better than a count. If the count has changed by one at a sample, one edge has passed, and the
+handle is still near it: at the lower end of its count after a step up, at the upper end after a step down. After
+several edges in a sample it is somewhere in its count, whose middle is taken. So an ideal wall of any stiffness gets no
+damping at all, at any speed of up to one edge a sample. In this measure, a handle that shakes about an edge does not
+move.
 
-Energy that was taken is a credit, energy that was given a debt. A credit is dropped where the wall renders no force,
-and is forgotten within `MEMORY_S`: an early impact would otherwise pay for a chatter long after it. A debt stays,
-across contacts, disables and faults. A preload or a shift of the origin, after which the
-position is another, begins with neither.
+Energy taken from the handle is a credit, energy given to it a debt. A credit is dropped where the wall renders no
+force, and is forgotten within `MEMORY_S`: an early impact would otherwise pay for a chatter long after it. A debt
+stays, across contacts, disables and faults. A preload or a shift of the origin, after which the position is another,
+begins with neither.
 
 In debt, where the wall renders a force, the controller adds a damper to it:
 
@@ -21,11 +22,11 @@ In debt, where the wall renders a force, the controller adds a damper to it:
 
 It takes a force to zero at most, and never turns it: it cannot pull where the wall pushes. The force is within the
 axis's range before the damper is taken off; in float64, where a wall has no range, behind it. The hardware halves the
-damper where float64 divides: the part is passivity_damping 2**-n with the least n for which the bits of the damper's
-force and of the velocity, together with those of the samples until the next actuation, are no more than the bits of
-the debt. Unless n is 0, less than twice the debt is dissipated until then, and a quarter of it at least where the
-samples of an actuation are a power of two, else an eighth, but for the rounding of the part to zero: a debt of less
-than the work of one force LSB stays.
+damper where float64 divides. The part is passivity_damping 2**-n with the least n that satisfies this: the bits of the
+damper's force, the velocity and the samples until the next actuation are together at most the bits of the debt. Unless
+n is 0, less than twice the debt is dissipated until then. At least a quarter of the debt is dissipated where the
+samples of an actuation are a power of two, else an eighth. One exception is the rounding of the part to zero: a debt of
+less than the work of one force LSB stays.
 
 Formats, derived, with the force LSB r and the count q:
 
@@ -35,8 +36,8 @@ Formats, derived, with the force LSB r and the count q:
   the damper's force by half a force LSB; the damper's force is rounded once, half up, and saturates with the force.
 
 Source: Hannaford and Ryu, Time-domain passivity control of haptic interfaces, IEEE Transactions on Robotics and
-Automation 18(1), 2002. The energy by positions, not velocities, is that of Ryu, Preusche, Hannaford and Hirzinger,
-IEEE Transactions on Control Systems Technology 13(5), 2005; the position by edges, and the halving, are our own.
+Automation 18(1), 2002. The energy by positions instead of velocities follows Ryu, Preusche, Hannaford and Hirzinger,
+IEEE Transactions on Control Systems Technology 13(5), 2005. The position by edges, and the halving, are this project's.
 """
 
 import math
@@ -111,7 +112,8 @@ class Design:
         displacement: format of the change of position in a sample, half counts.
         energy: format of the energy, force LSB half counts; its least word is not used.
         shift: fraction bits of the product of damping and velocity.
-        spare_bits: bits of the dissipation until the next actuation beyond those of its factors' magnitudes.
+        spare_bits: bits of the dissipation until the next actuation, in addition to the bits of its factors'
+            magnitudes.
         memory: a credit loses 2**-memory of itself in a sample.
         words: `passivity_damping`.
     """
@@ -220,7 +222,7 @@ def forgotten(params, energy):
 
 @compiled
 def significant_bits(value):
-    """Return the number of bits of a value but for those that are all as its sign: 0 for 0 and -1."""
+    """Return the number of bits of a value without its leading copies of the sign; 0 and -1 have none."""
     return length_of(value if value >= 0 else ~value)
 
 

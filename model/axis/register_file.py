@@ -4,16 +4,17 @@ A book of 16-bit cells has four areas of 256, which one port of a memory reads a
 
 - LIVE is what the host reads, by the address of the register.
 - RESET is what LIVE is set to by a reset: constants, and words as after a reset.
-- LEAST and MOST are the bounds of what may be written. Of a register of a status or of an active word, LEAST says how
-  it comes from the chain of a snapshot, or goes there for its port (`_moves`).
+- LEAST and MOST are the bounds of what may be written. For a status or an active word, LEAST says how it
+  comes from a snapshot's chain, or goes there for its port (`_moves`).
 
-A written word stays in LIVE until a commit copies every one to its active cell and to the port that the axis reads;
-then the pulses of the frame go out, all at one clock, and the axis takes the words at its next sample. A live word is
-at its port as soon as its lower half is written.
+A written word stays in LIVE until a commit. The commit copies every word to its active cell and to the port that the
+axis reads. Then the pulses of the frame go out, all at one clock, and the axis takes the words at its next sample. A
+live word is at its port as soon as its lower half is written.
 
-A snapshot takes the status in turns: at the first, all that moves with every clock or sample, at one clock; then what
-only events change. What is taken in one turn is of one clock, and every value is whole. The stamps of edges are
-remembered here, from the axis's pulse at every edge, each 0 until there was one.
+A snapshot takes the status in turns. The first turn takes, at one clock, everything that moves with every clock or
+sample. The later ones take the values that only events change. What is taken in one turn is of one clock, and every
+value is whole. The stamps of edges are remembered here, from the axis's pulse at every edge, each 0 until there was
+one.
 """
 
 from collections.abc import Sequence
@@ -41,14 +42,14 @@ EXCLUSIVE = {
     "preload": ("arm", "origin_shift"),
     "origin_shift": ("arm", "preload"),
 }
-"""The pulses that a frame may not have beside a pulse: an axis that is armed as its words or its count change would
+"""The pulses that exclude each other in one frame: an axis that is armed while its words or its count change would
 drive for the old wall or the old place."""
 WITH_WORDS = "commit", "preload", "origin_shift"
 """Pulses that need the active words at their ports."""
 CELL_BITS = 16
 CELL = (1 << CELL_BITS) - 1
 EXTENDED = 1 << CELL_BITS - 1
-"""In a LEAST cell of a status: the bits beyond those of the snapshot repeat the last one."""
+"""In a LEAST cell of a status: bits beyond the snapshot's repeat its last bit."""
 NEXT, SOURCE = 5, 12
 """In a LEAST cell of a status or an active word: the lowest bits of half the next cell's address and of
 the source."""
@@ -67,7 +68,7 @@ class Area(IntEnum):
 
 
 class Operation(IntEnum):
-    """What a register file does at a request; the first four are the phases of a frame, in their order."""
+    """The operations of a register file; the first four are the phases of a frame, in their order."""
 
     CHECK_READ = 0
     CHECK_WRITE = 1
@@ -79,10 +80,10 @@ class Operation(IntEnum):
 
 
 class Source(IntEnum):
-    """What the chain is loaded with before the cell of a status; the chain's lowest bits are taken first.
+    """The source that loads the chain before a status's cell; the chain's lowest bits are taken first.
 
-    The numbers are what the chain's logic needs: the two upper bits are alike, and choose between the lower two sources
-    and the upper two, of which the lowest bit chooses one.
+    The numbers suit the chain's logic. The two upper bits are alike and choose between the lower two and the upper two
+    sources; the lowest bit chooses one of the two.
     """
 
     NOTHING = 0
@@ -92,7 +93,7 @@ class Source(IntEnum):
 
 
 class Design:
-    """What the register file of a map holds.
+    """The content of a map's register file.
 
     Attributes:
         registers: the map.
@@ -150,8 +151,8 @@ class Design:
     def _moves(moved: list[tuple[Register, int]]) -> dict[int, int]:
         """Return the LEAST cells of values that pass through the chain one after the other, with their sources.
 
-        A cell has the bits that its register takes, half the address of the next cell, or 0 behind the last, the source
-        that the chain is loaded with before, and `EXTENDED`. The low half of a value comes first, so that odd and even
+        A cell has four parts: the bits of its register; half the address of the next cell, or 0 after the last; the
+        source that loads the chain before; and `EXTENDED`. The low half of a value comes first, so that odd and even
         addresses take turns.
         """
         cells, following = {}, 0
@@ -182,9 +183,9 @@ class RegisterFile:
 
     Attributes:
         live: the cells that the host reads.
-        active: the word that the axis uses, by name: of a live word the one at its port; of the others the one that is
-            at its port while a pulse of `WITH_WORDS` is high, and after a commit until the axis has it.
-        pulses: names of the pulses that went out at the last FINISH, and `marked`, those that go out at the next.
+        active: the words in use, by name. A live word is in use at its port. Another word is in use while a pulse of
+            `WITH_WORDS` is high, and after a commit until the axis has taken it.
+        pulses: names of the pulses that went out at the last FINISH; `marked`: the pulses for the next one.
         status: the word of every status now.
         refusing: names of the pulses that the device refuses now.
         capture: the registers of the capture memory, or None while they cannot be read.
@@ -205,7 +206,7 @@ class RegisterFile:
 
     @property
     def ports(self) -> dict[str, int]:
-        """The words that are at their ports with `pulses`, by name: the live ones, and those that a pulse needs."""
+        """The words at their ports together with `pulses`, by name: live words, and words that a pulse needs."""
         shifted = set(WITH_WORDS) & set(self.pulses)
         kept = (*self.design.registers.words, *self.design.registers.live) if shifted else self.design.registers.live
         return {word.name: self.active[word.name] for word in kept}
@@ -227,7 +228,7 @@ class RegisterFile:
     def check_read(self, address: int, first: bool, last: bool) -> None:
         """Find out whether a register can be read, as the first or the last of a frame or neither.
 
-        That of a capture memory that cannot be read is refused.
+        A capture memory's register is refused while the memory cannot be read.
         """
         captured = CAPTURE <= address < CAPTURE + self.design.registers.capture_registers
         self.refused |= captured and self.capture is None
@@ -236,8 +237,8 @@ class RegisterFile:
     def check_write(self, address: int, first: bool, last: bool, value: int) -> None:
         """Find out whether a register can be written with `value`.
 
-        The halves of a value must come in order: a word is compared with its bounds from the top, each half as long as
-        the halves above it are equal to the bound's.
+        The halves of a value must come in order. A word is compared with its bounds from the top: the next half counts
+        only while all halves above it equal the bound's.
         """
         self.absent |= not self.design.writable(address) or self._half(address, first, last)
         pulse = self._pulse(address) if value & 1 else ""
@@ -254,7 +255,7 @@ class RegisterFile:
             self._tied[k] = tied and word == bound
 
     def read(self, address: int) -> int:
-        """Return the register at an address that can be read; of a capture memory that cannot be read now it is 0."""
+        """Return the register at a readable address; 0 for a capture memory that cannot be read now."""
         if address < END:
             return self.live[address]
         if address < CAPTURE:
@@ -293,7 +294,7 @@ class RegisterFile:
             self.take(registers)
 
     def take(self, registers: tuple[Register, ...]) -> None:
-        """Take the words of some status: those of one turn."""
+        """Take the words of one turn of the status."""
         for register in registers:
             halves = register.to_registers(self.status[register.name])
             self.live[register.address : register.address + 2] = halves

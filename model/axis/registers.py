@@ -1,6 +1,6 @@
 """The registers of an axis, described once: the hardware, the host's map and every text about it are made from here.
 
-Addresses are those of Modbus: a register has 16 bits. A value of 32 bits has two registers, the high one first, at an
+Addresses are Modbus addresses: a register has 16 bits. A value of 32 bits has two registers, the high one first, at an
 even address; a value that has fewer bits is extended, by its sign if it has one. Pulses and counters have one register.
 
     0x0000 to 0x001F  constants: what the device is
@@ -15,9 +15,9 @@ even address; a value that has fewer bits is extended, by its sign if it has one
                       ends of the answers of the identification
     0x8000 to 0xFFFF  the window to the capture memory, eight registers a record, the oldest first
 
-The rule is stable: within a block registers follow in the order of their description, so what is added at the end of a
-block moves nothing, and only the words and the active ones move with the estimator. `commit` is the last pulse and
-ends where the written words begin: one frame can carry words and their commit.
+The rule is stable. Within a block registers follow in the order of their description, so an addition at the end of a
+block moves nothing. Only the words and the active words move with the estimator. `commit` is the last pulse and ends
+where the written words begin: one frame can carry words and their commit.
 
 What is not assigned in the first 256 registers reads 0 and cannot be written.
 """
@@ -40,7 +40,7 @@ from .designed import DesignedAxis
 from .supervised import Design
 
 LAYOUT = 1
-"""The version of the rule above, which is the first constant: a host that does not know it must not go on."""
+"""The version of the rule above, the first constant: a host that does not know it must stop."""
 CONSTANTS, TELEMETRY, SUPERVISOR, COUNTERS, PULSES, WRITTEN, ACTIVE, LIVE = 0, 0x20, 0x40, 0x60, 0x70, 0x80, 0xA0, 0xC0
 """The first address of every block."""
 END = 0x100
@@ -128,7 +128,7 @@ def _words(spec: DesignedAxis, committed: Iterable[Word]) -> tuple[Register, ...
 
 
 def _placed(base: int, room: int, registers: tuple[Register, ...]) -> tuple[Register, ...]:
-    """Return registers at successive addresses from `base` on, of which there are `room`."""
+    """Return registers at successive addresses from `base` on; there is room for `room` addresses."""
     size = sum(register.size for register in registers)
     if size > room:
         raise ValueError(f"the block at {base:#06x} must have at most {room} registers, not {size}")
@@ -165,8 +165,8 @@ class RegisterMap:
     Attributes:
         spec, capture_registers: as given.
         capture: the design of the capture memory, or None.
-        status, pulses, words, active, live: the registers of those kinds in the order of the hardware's ports;
-            `pulses` begins with `commit`, whose address is the highest.
+        status, pulses, words, active, live: the registers of these kinds in the order of the hardware's ports; `pulses`
+            begins with `commit`, at the highest address.
         registers: every register, in the order of addresses.
         identity: the hash of the build, 16 hexadecimal digits.
         compressed: the map that the device carries, of all but the constants: zlib, JSON.
@@ -266,20 +266,20 @@ class RegisterMap:
 
     @property
     def _more_constants(self) -> tuple[tuple[str, int, str, str], ...]:
-        """Constants behind those that every device has: name, value, unit and meaning."""
+        """Constants after the ones that every device has: name, value, unit and meaning."""
         return ()
 
     @property
     def _more_described(self) -> dict[str, int]:
-        """What the map that the device carries says beside the registers."""
+        """The part of the device's own map besides the registers."""
         return {}
 
     @property
     def identification(self) -> dict[tuple[bool, int], bytes]:
         """The ends of the answers that identify the device, by whether one object is asked for, and by the first one.
 
-        An end has the conformity level, no more to follow, the number of objects, and the objects, each with its number
-        and its length: vendor, product, and the build's identity as its revision. All have an even length.
+        An end has the conformity level, no more to follow, the number of objects, and the objects. Each object has its
+        number and its length: vendor, product, and the build's identity as its revision. All have an even length.
         """
         texts = b"hardwall", self.PRODUCT, self.identity.encode()
         objects = [bytes([number, len(text)]) + text for number, text in enumerate(texts)]

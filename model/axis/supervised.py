@@ -14,12 +14,12 @@ FIXED = ("output_force_limit",)
 """Words of the axis that no host writes: the supervisor's force limit holds at once, and after everything."""
 FROM_AXIS = ("encoder_illegal", "encoder_overspeed", "position_wrap", "strobe_busy")
 FROM_OUTSIDE = ("word_range", "external_fault", "emergency_stop")
-"""Causes that the axis shows, and causes that the live words and pins show. The monitors show the others, and with the
-axis position_wrap."""
+"""Causes that come from the axis, and causes that come from live words and pins. The monitors show the others, and with
+the axis position_wrap."""
 
 
 SLIPS = monitors.ENCODER_LOSS, monitors.INDEX_SPACING
-"""Causes of the monitors by which an axis that watches them has lost its scale, and with it its reference."""
+"""Causes that mean a lost scale: an axis that watches them loses its reference."""
 
 
 class Design:
@@ -49,12 +49,12 @@ class Design:
         return (*self.committed, *self.live)
 
     def registers(self) -> tuple[Register, ...]:
-        """Return what a host sees of the supervisor and the monitors, and what it asks of them, as registers."""
+        """Return the host's registers of the supervisor and the monitors, status and pulses."""
         return registers_of(self.spec, self.live)
 
 
 def registers_of(spec: DesignedAxis, live: Sequence[Word]) -> tuple[Register, ...]:
-    """Return what a host sees of the supervisor and the monitors of an axis, and what it asks of them, as registers.
+    """Return the host's registers of an axis's supervisor and monitors, status and pulses.
 
     Args:
         spec: the axis, alone or one of several.

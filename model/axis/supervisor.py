@@ -1,8 +1,8 @@
-"""The supervisor: the one place that lets a drive out; twin of `hardwall.hdl.axis.supervisor`.
+"""The supervisor, the only way of a drive to the output; twin of `hardwall.hdl.axis.supervisor`.
 
-The drive is zero unless the supervisor is ARMED. It starts DISARMED; the host's arm takes it to ARMED, and a cause of
-`CAUSES` from any state to TRIPPED, which it leaves for DISARMED only when the host acknowledges exactly the causes that
-are latched. One `step` is one clock:
+The drive is zero unless the supervisor is ARMED. It starts DISARMED. The host's arm takes it to ARMED. A cause of
+`CAUSES` takes it from any state to TRIPPED. It leaves TRIPPED for DISARMED only when the host acknowledges exactly the
+latched causes. One `step` is one clock:
 
     standing   = causes that are present, enabled and watched in this state; link_timeout is made here
     state      <- TRIPPED if standing; else as `State` says
@@ -88,7 +88,7 @@ def names(causes: int) -> list[str]:
 
 
 class Params(NamedTuple):
-    """What is fixed for a design."""
+    """The constants of a design."""
 
     ramp_fraction: int  # fraction bits of the ceiling
     pump_clocks: int  # clocks for which `alive` keeps a level

@@ -6,10 +6,10 @@
 
 With `forbid_pull`, push is never negative: a damper that pulls back a leaving handle would make the wall sticky.
 
-A `Design` with `coupling` has two words more. `wall_velocity` is that of the surface, else 0; with `two_sided` the push
-is that of every depth. So whoever simulates a tool can couple the handle to it, by a spring and a damper at the rate of
-the axis: the tool may then be simulated at a lower one. (Colgate, Stanley and Brown, Issues in the haptic display of
-tool use, IROS 1995.)
+A `Design` with `coupling` has two words more. `wall_velocity` is the surface's velocity, else 0. With `two_sided` the
+wall pushes at every depth, inside and outside. So a simulated tool can be coupled to the handle by a spring and a
+damper at the rate of the axis. The tool itself may be simulated at a lower rate. (Colgate, Stanley and Brown, Issues in
+the haptic display of tool use, IROS 1995.)
 
 Formats, derived, with the force LSB r, the count q and the sample period tau:
 
@@ -17,8 +17,8 @@ Formats, derived, with the force LSB r, the count q and the sample period tau:
   of two counts of a handle are taken modulo the count's width; this one is none.
 - `stiffness` and `damping` are gain words in force LSB a count and a count/sample.
 - The velocity keeps only as many fraction bits as can move the push by half a force LSB at the largest damping; the
-  other bits are dropped (floor). The surface's velocity is a word with as many, also where the estimator's has fewer: a
-  finite difference has none, and a surface of less than a count a sample would stand still for the damper.
+  other bits are dropped (floor). The surface's velocity has as many fraction bits, also where the estimator's has
+  fewer. A finite difference has none: for the damper, a surface slower than a count a sample would then stand still.
 - The products are added exactly and rounded once, half up, to a force LSB; then push saturates at the largest
   magnitude of the force format.
 
@@ -36,7 +36,7 @@ from ..words import Word, gain_format
 LEAD = 2
 """Clocks from the pulse `lead`, with a sample's count, to the strobe with its velocity, at least.
 
-The next sample's `lead` may come with that strobe, so that these are the clocks from a lead to the next, too.
+The next sample's `lead` may come with that strobe, so these are also the clocks from one lead to the next.
 """
 LATENCY = 3
 """Clocks from the strobe to `valid`: see `hardwall.hdl.axis.wall`."""
@@ -75,8 +75,8 @@ class FloatParams(NamedTuple):
 
 
 def damper_formats(axis: AxisRequirements, velocity: SQ) -> tuple[UQ, SQ, SQ]:
-    """Return the formats of a damping word, in force LSB a count/sample, of the velocity as the damper takes it, and of
-    a velocity with every bit that a damper can use."""
+    """Return three formats: of a damping word, in force LSB a count/sample; of the velocity as the damper takes it; and
+    of a velocity with every bit that a damper can use."""
     tau = 1 / axis.sample_hz
     damping = gain_format(axis.damping_max_n_s_per_m * axis.count_m / tau / axis.force_resolution_n)
     whole = SQ(velocity.i, max(1 + damping.i, 1 - velocity.i))
@@ -96,7 +96,7 @@ class Design:
         stiffness, damping: gain formats.
         depth: format of the depth.
         coarse: format of the velocity as the damper takes it.
-        surface: format of the surface's velocity; of a wall, whose surface stands, that of `coarse`.
+        surface: format of the surface's velocity; for a wall at rest the format of `coarse`.
         push: fraction bits in which the products are added.
         lean_bits: bits of what the surface's velocity adds, with half a force LSB.
         total_bits: bits of the whole sum.

@@ -13,7 +13,7 @@ from . import supervisor
 
 
 class Params(NamedTuple):
-    """What is fixed for a design."""
+    """The constants of a design."""
 
     pump_clocks: int  # clocks for which the wave keeps a level
     tick_turns: int  # times so many clocks in a tick, 1 ms
@@ -41,7 +41,7 @@ START = State(*(0 for _ in State._fields))
 
 
 class Design:
-    """The divider of a device's clock, and the word of its watchdog: those of an axis's supervisor."""
+    """The divider of a device's clock, and the word of its watchdog, both from an axis's supervisor."""
 
     def __init__(self, axis: AxisRequirements):
         design = supervisor.Design(axis)

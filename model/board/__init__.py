@@ -1,1 +1,1 @@
-"""What a board has around its axes."""
+"""The parts of a board around its axes."""

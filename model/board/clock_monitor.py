@@ -8,9 +8,9 @@ oscillator, which is the second:
     running <- left > 0, and it was running, or the beat has changed for the second time
 
 The numbers follow from the rates. A level of the beat lasts two periods of the slowest oscillator, so that none is
-missed, and `BEAT_MIN` clocks; the limit is as many clocks of the fastest oscillator as such a level lasts, and `MARGIN`
-more, so that a clock that runs is never taken for one that stands. A clock that comes back may change the beat at once;
-until it does so again it has made `BEAT_MIN` edges, at each of which `running` is low.
+missed, and `BEAT_MIN` clocks. The limit is the number of clocks of the fastest oscillator in such a level, and `MARGIN`
+more. So a running clock is never taken for a stopped one. A clock that comes back may change the beat at once. Until
+the next change it makes `BEAT_MIN` edges; `running` is low at each of them.
 """
 
 from typing import NamedTuple
@@ -38,13 +38,13 @@ class Params(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What the block sees just before a clock edge: the level of the beat."""
+    """The block's inputs just before a clock edge: the level of the beat."""
 
     beat: int = 0
 
 
 class State(NamedTuple):
-    """What the block keeps.
+    """The block's state.
 
     Attributes:
         running: whether the watched clock runs.

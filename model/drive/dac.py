@@ -7,8 +7,8 @@ With b bits the output has 2**b codes from minus to plus the full scale, the mid
 where `steps` is at most 2**(b-1) - |offset|, so that a code is never beyond the lowest.
 
 The frame is, from its first bit on, a header, the code in b bits (offset binary or two's complement), and trailing
-zeros. Half a period of the serial clock has H clocks; with F bits a frame is under way for 2 F + 1 halves, from the
-fall of the chip select to its rise, and another half later the next may begin.
+zeros. Half a period of the serial clock has H clocks; with F bits a frame takes 2 F + 1 halves, from the fall of the
+chip select to its rise; another half later the next frame may begin.
 
 Behind every arming the frames of `setup` go out first, one at an actuation: what a DAC wants to be told before it makes
 volts. The clear pin is low unless the axis is ARMED: its level must hold the DAC at the middle code, or its output at
@@ -36,13 +36,13 @@ class Stage(stage.Stage):
     """A serial DAC.
 
     Attributes:
-        amplifier: what follows the DAC; its full scale is that of the code -2**(bits - 1).
+        amplifier: the amplifier after the DAC; its full scale belongs to the code -2**(bits - 1).
         bits: bits of the code.
-        coding: how a code is written.
+        coding: the coding of a code's value.
         header_bits, header: the bits before the code, and their number.
         trailing_bits: the zeros behind it.
-        mode: of the SPI: 0 or 1 if the serial clock rests low, 2 or 3 if it rests high; a bit is taken at the first
-            edge of its period in the modes 0 and 2, at the second in 1 and 3.
+        mode: mode of the SPI. The serial clock rests low in the modes 0 and 1, high in 2 and 3. A bit is taken at the
+            first edge of its period in 0 and 2, at the second in 1 and 3.
         serial_hz: the highest frequency of the serial clock.
         setup: whole frames that go out first.
     """
@@ -82,7 +82,7 @@ class Params(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What the block sees just before a clock edge; `strobe` comes with a new drive."""
+    """The block's inputs just before a clock edge; `strobe` comes with a new drive."""
 
     strobe: int = 0
     magnitude: int = 0
@@ -91,7 +91,7 @@ class Inputs(NamedTuple):
 
 
 class State(NamedTuple):
-    """What the block keeps.
+    """The block's state.
 
     Attributes:
         ready: the axis was ARMED at the last edge.

@@ -4,8 +4,9 @@ With N bits of the drive's magnitude, per clock
 
     sum <- sum mod 2**N + amount        pulse = (sum >= 2**N)
 
-so the density of ones is exactly amount / 2**N. Without an amplifier in the stage `amount` is the drive's magnitude,
-and full density 2**N force LSB; with one it is the magnitude in steps of the amplifier's full scale / 2**N, by `scale`.
+so the density of ones is exactly amount / 2**N. Without an amplifier in the stage, `amount` is the drive's magnitude,
+and full density is 2**N force LSB. With an amplifier, `amount` is the magnitude in steps of the amplifier's full scale
+/ 2**N, by `scale`.
 """
 
 from dataclasses import dataclass
@@ -27,7 +28,7 @@ class Stage(stage.Stage):
 
 
 USUAL = Stage()
-"""The stage of an axis for which nothing else is said."""
+"""The default stage of an axis."""
 
 
 class Params(NamedTuple):
@@ -39,7 +40,7 @@ class Params(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What the block sees just before a clock edge."""
+    """The block's inputs just before a clock edge."""
 
     magnitude: int = 0
     negative: int = 0

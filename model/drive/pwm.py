@@ -6,12 +6,12 @@ A period has P clocks. At its end the drive is taken, in steps of full scale / P
 
 The leg that pulses is high for exactly `width` clocks of the period, and otherwise low; the other leg is low. From one
 gate of a leg to the other both are off for D clocks, the dead time: after the low gate is off, and again after the high
-one is. A motor's current that has the sign of the drive goes on through the diode of the low gate meanwhile, so that
-the mean of the volts is width / P of the supply, and the dead time costs none of it. A drive of zero while ARMED is
-0 V, a brake: both low gates on. Not ARMED all gates are off, and the motor coasts.
+one is. A motor current with the sign of the drive flows on through the diode of the low gate meanwhile. So the mean
+voltage is width / P of the supply, and the dead time costs nothing of it. A drive of zero while ARMED is 0 V, a brake:
+both low gates on. Not ARMED all gates are off, and the motor coasts.
 
-The width is at most P - 3 D: so the low gate of the leg that pulses is on for D clocks or more in every period, which a
-driver with a bootstrap needs, too.
+The width is at most P - 3 D. So the low gate of the pulsing leg is on for at least D clocks in every period; a driver
+with a bootstrap needs this, too.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class Stage(stage.Stage):
     """The gates of an H-bridge.
 
     Attributes:
-        amplifier: bridge and motor; its full scale is that of a bridge that is on all the time, so the supply's volts.
+        amplifier: bridge and motor; its full scale is the supply's voltage, for a bridge that is always on.
         pwm_hz: frequency of the pulses; divides the clock.
         dead_time_s: the least time from one gate of a leg to the other; rounded up to clocks.
     """
@@ -53,7 +53,7 @@ class Params(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What the block sees just before a clock edge."""
+    """The block's inputs just before a clock edge."""
 
     magnitude: int = 0
     negative: int = 0

@@ -6,8 +6,8 @@ With N the bits of the drive's magnitude, r the force LSB and s the force of a s
     gain  = round(r / s * 2**shift)
     steps = min(floor((magnitude * gain + 2**(shift - 1)) / 2**shift), most)
 
-The gain is wrong by at most half of its LSB, which is 2**N / 2**(shift + 1) = 1/8 of a step at the largest magnitude,
-and a half is rounded up: so `steps` is within 5/8 of a step of the drive, the same both ways.
+The gain is wrong by at most half of its LSB: 2**N / 2**(shift + 1) = 1/8 of a step at the largest magnitude. A half is
+rounded up. So `steps` is within 5/8 of a step of the drive, in both directions alike.
 """
 
 from typing import NamedTuple
@@ -19,7 +19,7 @@ from ..runtime.compiled import compiled
 LATENCY = 2
 """Clocks from a drive to its steps: product, then rounding."""
 GUARD_BITS = 2
-"""Bits of the gain beyond those of the magnitude: they leave an eighth of a step."""
+"""Bits of the gain in addition to the magnitude's: the error is then an eighth of a step."""
 GAIN_BITS_MAX = 34
 """The most bits of a gain: its product with the widest magnitude, of 24 bits, and the rounding fit 63 bits."""
 

@@ -1,4 +1,4 @@
-"""What every drive stage has: the amplifier behind it, in SI units, and the design that follows.
+"""The base of every drive stage: the amplifier after it, in SI units, and the design that follows.
 
 A drive stage is the last arrow of the path of data: from the drive that the supervisor lets out to the pins. To add
 one, write `hdl/drive/NAME.py`, `model/drive/NAME.py` and `tests/drive/test_NAME.py`, and add a line to each `registry`.
@@ -18,7 +18,7 @@ UNITS: tuple[Unit, ...] = get_args(Unit)
 
 @dataclass(frozen=True, kw_only=True)
 class Amplifier:
-    """What stands between a stage's pins and the force on the handle.
+    """The amplifier between a stage's pins and the force on the handle.
 
     Attributes:
         unit: V if the stage sets volts, A if the amplifier makes amperes of them.
@@ -57,7 +57,7 @@ class Amplifier:
 
 @dataclass(frozen=True, kw_only=True)
 class Stage(ABC):
-    """What an axis is to have as its drive stage.
+    """The specification of an axis's drive stage.
 
     Attributes:
         amplifier: what is behind it.
@@ -76,9 +76,9 @@ class StageDesign(ABC):
     """Formats, numbers and latency of a drive stage for an axis.
 
     Attributes of the class:
-        stage_class: the stage's `Stage`, whose name is that of the stage in scenes.
+        stage_class: the stage's `Stage`; its name is the stage's name in scenes.
         pins: the names of its pins, all of them outputs.
-        safe: the level of the pins that is safe, in words.
+        safe: the safe level of the pins, in words.
         safe_latency: clocks from an axis that is not ARMED to safe pins.
 
     Attributes:

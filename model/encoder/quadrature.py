@@ -155,7 +155,8 @@ LATENCY = 4
 
 
 def latency(glitch_clocks: int) -> int:
-    """Return the clock edges from the first that sees a pin changed to the one that sets the new count, both included.
+    """Return the number of clock edges from the first that sees a changed pin to the setting of the new count, both
+    included.
 
     The synchroniser takes two, the filter `glitch_clocks` + 1, and decoding and adding one.
     """
@@ -166,8 +167,8 @@ def latency(glitch_clocks: int) -> int:
 def _filtered(state, inputs):
     """Filter glitches from the synchronised pins: return (level, accepted, pending, crossing, outrun).
 
-    `level` is the level accepted before this clock; `outrun` says whether a pulse is rejected during which the other
-    channel had an edge.
+    `level` is the level accepted before this clock. `outrun` is high if a pulse is rejected, and the other channel had
+    an edge during it.
     """
     # While the synchronisers fill, their output counts as accepted already.
     level = state.second if state.starting > 0 else state.level
@@ -316,8 +317,8 @@ def resting(params, state, count, pins, clocks):
 
 @compiled
 def _lone(state, pins, inputs, clocks):
-    """Return whether a settled state meets the edge of one channel, A or B, that is decoded and settled in `clocks`,
-    and that finds no index."""
+    """Return whether a settled state meets an edge of one channel, A or B, that finds no index and is decoded and
+    settled in `clocks`."""
     changed, still = state.level ^ pins, state.inverted == inputs.invert and settled(state, state.level)
     return 0 < changed < 3 and clocks > LATENCY + inputs.glitch_clocks and still and state.below == state.level >> 2
 
@@ -385,8 +386,8 @@ def _settle(params, state, inputs, pins, clocks):
 def advance(params, state, inputs, clocks):
     """Return the state after `clocks` steps with constant `Inputs` and no strobes; 0 <= clocks < 2**62.
 
-    The result is exactly that of repeated calls of `step`, in no more calls than `latency`. The settled case is
-    separate because it is the common one: it compiles to a few instructions in the caller's loop.
+    The result equals repeated calls of `step` exactly, in at most `latency` calls. The settled case is separate because
+    it is the common one: it compiles to a few instructions in the caller's loop.
     """
     pins = inputs.a | inputs.b << 1 | inputs.z << 2
     if clocks > 0 and state.inverted == inputs.invert and settled(state, pins):

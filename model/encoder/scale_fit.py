@@ -1,20 +1,20 @@
 """Learns a map of an encoder's scale from the stamped edges of training passes: the host's part of `scale_map`.
 
-Edge k of a pass, number n_k, was passed at its stamp t_k, so the axis was then at n_k + e(n_k), and half the hysteresis
-h off in the direction of motion. The motion x of a pass is taken for a spline of degree DEGREE with a knot every
-`knot_s`, of the edges on both sides of any moment; every bin of the map has one error. All of them at once are those
-with the least sum of squares, over all passes:
+Edge k of a pass, number n_k, was passed at its stamp t_k. The axis was then at n_k + e(n_k), and half the hysteresis h
+off in the direction of motion. The motion x of a pass is modelled as a spline of degree DEGREE with a knot every
+`knot_s`. It covers the edges on both sides of any moment. Every bin of the map has one error. All of them at once are
+those with the least sum of squares, over all passes:
 
     sum_k (x(t_k) - n_k - e(bin of n_k) - h d_k)**2 + RIDGE sum_bins e**2             d_k = 1/2 upwards, -1/2 downwards
 
 The errors are eliminated bin by bin, and the coefficients of the splines are the solution of what is left. Nothing but
 stamps and numbers is used, and no order of passes matters.
 
-What cannot be told. An error that a spline follows, as a function of the time of a pass, is motion as well as error:
-any constant, what is proportional to n, and what is so long that it passes below about 1 / (2 knot_s) Hz in all passes.
-RIDGE, which is far less than one edge, gives that part to the motion: a map keeps the mean and the scale of the
-encoder. In turn what the hand does above that frequency is taken for an error of the scale, though of another one in
-every pass; it falls with the passes.
+What cannot be told. If a spline can follow an error as a function of the time of a pass, the error cannot be told from
+motion. Such errors are a constant, a term proportional to n, and a long wave: one that passes below about 1 / (2
+knot_s) Hz in all passes. RIDGE, which is far less than one edge, gives that part to the motion: a map keeps the mean
+and the scale of the encoder. In turn, motion of the hand above that frequency is taken for an error of the scale. It
+differs in every pass, so it falls with the number of passes.
 
 Source: the splines are de Boor 1978, A Practical Guide to Splines, chapter X; least squares with the many unknowns of
 their own elimination are the bundle adjustment of photogrammetry. Their use on an encoder's edges is this project's.
@@ -31,9 +31,9 @@ KNOT_S = 0.1
 """The distance of two knots: a hand that swings has little beyond 5 Hz."""
 KNOTS_S = 1e-3, 10.0
 RIDGE = 1e-2
-"""What an error of one count costs, in squares of a count: a bin that hundreds of edges are in is theirs."""
+"""The cost of an error of one count, in squares of a count; hundreds of edges in a bin outweigh it."""
 FIRM = 1e-9
-"""What a coefficient of a spline costs, so that a spline without edges is 0; an edge has some thousandths at least."""
+"""The cost of a coefficient of a spline, so that a spline without edges is 0; an edge has some thousandths at least."""
 
 
 @compiled
@@ -105,7 +105,7 @@ class Fit:
         return int(np.count_nonzero(self._hits))
 
     def add(self, times_s: np.ndarray, numbers: np.ndarray) -> None:
-        """Add a pass: when its edges were passed, in order, and their numbers, which are those of a referenced count.
+        """Add a pass: the times of its edges, in order, and their numbers in a referenced count.
 
         Raises:
             ValueError: if there are no edges, not as many times as numbers, or times that fall.

@@ -2,19 +2,19 @@
 
 Twin of `hardwall.hdl.encoder.scale_map`.
 
-Edge n of an encoder stands at n + e(n) counts. The map has e for the bins of 2**`bin_bits` edges that begin at edge
-`first`, one word each; it is written by the host, zero before that, and only read by the axis. `scale_fit` learns it.
+Edge n of an encoder stands at n + e(n) counts. The map has one word e for each bin of 2**`bin_bits` edges, from edge
+`first` on. The host writes it; it is zero before that, and the axis only reads it. `scale_fit` learns it.
 
     bin = floor((n - first) / 2**bin_bits), at least 0 and at most the last;  e = places[bin]
 
 An edge `outside` the bins has the error of the nearest bin, so that there is no step at their ends. A count that wraps
-does so outside. The number of an edge is that of the count, so a map holds only while the count is referenced: what
-reads the map has an `enabled` for that, and without it every error is 0. An origin that is shifted while the map holds
-moves the numbers of all edges: n is then the number less that shift (`unshifted`), so that an edge keeps its bin.
+does so outside. Edges are numbered by the count, so a map holds only while the count is referenced. A reader of the map
+has an input `enabled` for this; without it every error is 0. If the origin is shifted while the map holds, the numbers
+of all edges change. n is then the number less that shift (`unshifted`), so an edge keeps its bin.
 
-Formats. `place` SQ(i, FRACTION_BITS) in counts: i holds `limit_counts`, to which errors saturate. An error that is
-rounded to a 64th is off by 0.0045 counts RMS, a tenth of what edges that are each off by 0.05 are. The width of a bin
-costs more: an error that changes by g counts an edge is off by g 2**bin_bits / sqrt(12).
+Formats. `place` SQ(i, FRACTION_BITS) in counts: i holds `limit_counts`, to which errors saturate. Rounding to a 64th
+gives 0.0045 counts RMS: a tenth of an edge error of 0.05 counts. The width of a bin costs more: an error that changes
+by g counts an edge is off by g 2**bin_bits / sqrt(12).
 """
 
 from typing import NamedTuple

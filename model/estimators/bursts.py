@@ -9,22 +9,22 @@ silence then says how fast the axis is. The watch tells such an encoder from oth
     bursts        EVENTS jolts after silences longer than the estimator tolerates, each within MEMORY_S of the one
                   before; until none comes for that time
 
-Derivation. With A = STEEPER times the axis's bound on the acceleration, q a count, and edges in places that any scale
-has which the decoder takes (two neighbours are less than 2 q apart, and three span more than q):
+Derivation. A is STEEPER times the axis's bound on the acceleration, and q a count. Edges are in places that the decoder
+accepts: two neighbours are less than 2 q apart, and three span more than q. Then:
 
 - In a silence of S the axis stays within 2 q, so it is at some time no faster than 2 q / S. Until the end of the
-  silence it gains at most 2 sqrt(A q), for it has no more than 2 q to do so; and until t later A t more.
-- Three edges in a time of T < S / 4 are a speed of more than q / T, of which 2 q / S is less than half.
+  silence it gains at most 2 sqrt(A q), because it has at most 2 q for this; and until t later A t more.
+- Three edges in a time of T < S / 4 mean a speed above q / T. 2 q / S is less than half of it.
 - So a motion with less than A has T > q / (4 sqrt(A q) + 2 A t) after every silence. `span` is this bound, with t the
   `window` of samples in which the three edges must come; the window is as long as the bound for t = 0, and a sample.
 
-Stamps are late by less than a clock, which is taken off. At a constant speed no edges are a jolt, wherever they are.
-An encoder whose bursts have two edges or none is not told from one with edges out of place: its edges are at most two
+Stamps are late by less than a clock, which is taken off. At a constant speed no edges are a jolt, wherever they are. An
+encoder whose bursts have two edges or none is not told from one with edges out of place: its edges are at most two
 counts from their place. An estimator with a memory or a window reads the mean of bursts that are short against it, and
-tolerates their silence: that bursts are found is to say that the estimate is none.
+tolerates their silence. Where bursts are found, its estimate is not valid.
 
-Every estimator that bounds the speed by silence takes `doubt_samples` for the time in which silence is no evidence.
-A restart, and the first sample, forget everything.
+An estimator that bounds the speed by silence ignores silence for `doubt_samples` after a burst. A restart, and the
+first sample, forget everything.
 """
 
 import math
@@ -52,7 +52,7 @@ LATENCY = 3
 
 
 class Limits(NamedTuple):
-    """What the watch compares with: bits of count and stamp; clocks of three edges, and of a silence; samples."""
+    """The limits of the watch: bits of count and stamp; clocks of three edges, and of a silence; samples."""
 
     count_width: int
     stamp_width: int
@@ -63,11 +63,11 @@ class Limits(NamedTuple):
 
 
 class Watch(NamedTuple):
-    """The state: the last sample, and what was before the edges that are judged.
+    """The state: the last sample, and the edges and counts before the ones that are judged.
 
-    `stamp`, `edge` and `count` are of the last sample, `quiet` is the age of its last edge; `silence` and `base` are
-    the quiet and the count before the edges of the last `window` samples, and `left` is for how many more samples the
-    `events`, the jolts that count, are remembered. Ages are cut off at what every jolt has.
+    `stamp`, `edge` and `count` are of the last sample, `quiet` is the age of its last edge. `silence` and `base` are
+    the quiet and the count before the edges of the last `window` samples. `events` is the number of remembered jolts;
+    `left` is the number of samples until they are forgotten. Ages are cut off at what every jolt has.
     """
 
     running: int
@@ -107,7 +107,7 @@ def limits(axis: AxisRequirements, tolerated_s: float = 0.0) -> Limits:
 
 @compiled
 def longest(limits):
-    """Return at what an age is cut off: a silence that is one for every three edges."""
+    """Return the age at which silences are cut off: any three edges after it are a jolt."""
     return max(4 * limits.span + 5, limits.tolerated + 1)
 
 

@@ -6,9 +6,9 @@ Per sample, with d the difference of the last two counts, in counts and sample p
     w <- w + gamma (x - y) - beta w
     y <- y + gamma w                     the velocity, output `u`; with the new w
 
-With g = tan(pi f_c / f_s) and D = 1 + sqrt(2) g + g^2, gamma = 2 g / sqrt(D) and beta = 2 sqrt(2) g / D make this the
-bilinear transform, prewarped, of 1 / (s^2 + sqrt(2) s + 1): eliminate w, and y[k] - (2 - beta - gamma^2) y[k-1] +
-(1 - beta) y[k-2] = gamma^2 x[k]. Before the first sample the filter is at rest at velocity 0.
+Let g = tan(pi f_c / f_s) and D = 1 + sqrt(2) g + g^2. Let gamma = 2 g / sqrt(D) and beta = 2 sqrt(2) g / D. Then this
+is the bilinear transform, prewarped, of 1 / (s^2 + sqrt(2) s + 1). Eliminating w gives y[k] - (2 - beta - gamma^2)
+y[k-1] + (1 - beta) y[k-2] = gamma^2 x[k]. Before the first sample the filter is at rest at velocity 0.
 
 Source: Chawda, Celik, O'Malley, World Haptics 2011, "FDM" with a Butterworth filter; Butterworth 1930.
 
@@ -22,7 +22,7 @@ the two states are of the same size, both coefficients are of the same order, an
   the additional bits.
 
 The norms are sums of the absolute impulse responses from each place to y, the largest over all cutoffs up to
-CUTOFF_MAX; STATE_NORM is the same from x to w and y: no input makes them larger.
+CUTOFF_MAX. STATE_NORM is the same from x to w and y. No input makes w or y larger.
 
 Formats, derived. C' = C tau^2 / q is the bound on the acceleration in counts a sample^2.
 
@@ -42,8 +42,8 @@ Formats, derived. C' = C tau^2 / q is the bound on the acceleration in counts a 
 - They hold any cutoff from the default one / 2**RANGE_BITS, or the designed one if that is lower, to CUTOFF_MAX.
 - int64 holds 62 bits: if the formats do not fit, first the range of cutoffs is reduced, then f.
 
-Range of the words. The poles are those of z^2 - (2 - beta - gamma^2) z + 1 - beta. By Jury's criterion they are stable
-if and only if 0 < beta, 0 < gamma and gamma^2 + 2 beta < 4.
+Range of the words. The poles are the roots of z^2 - (2 - beta - gamma^2) z + 1 - beta. By Jury's criterion they are
+stable if and only if 0 < beta, 0 < gamma and gamma^2 + 2 beta < 4.
 
 - Both mantissas begin at LEAST, below which no cutoff has any. 0 is refused: it would hold the velocity, or leave an
   oscillation without damping.

@@ -1,16 +1,16 @@
 """Times of whole encoder cycles from the clock stamps of their edges, exact to the stamps.
 
-The four edges of an encoder's cycle (A rise, B rise, A fall, B fall) may be out of place, each kind by its own error,
-but an edge is exactly 4 counts from the edge of its kind in the next cycle, so the time of a cycle is the time between
+An encoder's cycle has four edges: A rise, B rise, A fall, B fall. They may be out of place, each kind by its own error.
+But an edge is exactly 4 counts from the edge of its kind in the next cycle. So the time of a cycle is the time between
 two edges of one kind. `observe` subtracts, from the stamp of the last edge, the stamp of its kind at the previous
-sample. The difference spans a whole number of cycles only if all edges between went in one direction, as far as samples
-show: the direction did not change, and the decoder's run covers the counts between.
+sample. The difference spans a whole number of cycles only if all edges between went in one direction. Samples show this
+if the direction did not change and the decoder's run covers the counts between.
 
-A stamp wraps after 2**stamp_width clocks. An edge is forgotten in the last quarter of that time (after AGE_LIMIT of it:
-the two top bits of its age are set), so a sample must be no longer than that quarter; older edges cannot alias. At the
-first sample, and with a restart, all edges are forgotten: an edge is known once its stamp has changed since then. An
-illegal transition ends the run of known edges; if four more edges follow it within its sample, only the decoder's flag
-shows it.
+A stamp wraps after 2**stamp_width clocks. An edge is forgotten in the last quarter of that time: after AGE_LIMIT of it,
+when the two top bits of its age are set. So a sample must be at most as long as that quarter; older edges cannot alias.
+At the first sample, and with a restart, all edges are forgotten: an edge is known once its stamp has changed since
+then. An illegal transition ends the run of known edges; if four more edges follow it within its sample, only the
+decoder's flag shows it.
 
 Source: Brown, Schneider, Mulligan, IEEE Trans. Industrial Electronics 1992, fixed-position methods.
 """
@@ -76,8 +76,8 @@ def observe(params, memory, seen, restart):
     right_age = (seen.stamp - stamp_of(seen, right)) & modulus
     left_known, right_known = fresh >> left & 1, fresh >> right & 1
 
-    # The two kinds next to the last edge's are those of the edge before it and of the edge three before it; the ages
-    # tell which is which.
+    # The two kinds next to the last edge's belong to the edge before it and to the edge three before it. The ages tell
+    # which is which.
     left_first = left_known and not (right_known and right_age < left_age)
     before = left_age if left_first else right_age
     run = seen.run if fresh >> kind & 1 else 0

@@ -1,9 +1,9 @@
 """Velocity from the clock stamps of the encoder's edges: a Kalman filter of edges whose places are uncertain.
 
-An edge says where the axis is, to the edge's own error, at a time that its stamp gives to a clock. Position, velocity
-and acceleration are tracked from edge to edge, with gains for the time T between them; nothing is corrected between
-edges. With v in counts a sample, a in counts a sample per clock, D clocks a sample, n the edges passed (0 if the same
-edge is crossed back), and x the distance of the axis from the edge that it was last seen at, times D, at every edge:
+An edge gives the position of the axis, with the edge's own error, at a time that its stamp gives to a clock. Position,
+velocity and acceleration are tracked from edge to edge, with gains for the time T between them. Nothing is corrected
+between edges. v is in counts a sample, a in counts a sample per clock, D is the clocks of a sample. n is the edges
+passed, 0 if the same edge is crossed back. x is the distance of the axis from its last edge, times D. At every edge:
 
     r = n D - (v + a T/2) T - x                               the innovation
     z <- z + blend (r - z)                                    its mean over an agile memory
@@ -12,50 +12,49 @@ edge is crossed back), and x the distance of the axis from the edge that it was 
 and at every sample, s clocks after the last edge, u = v + a s; this line is the output, `u`. A sample takes its last
 edge alone: where edges come faster than samples, T is the time between edges in use.
 
-The gains are those of the steady-state Kalman filter of a white jerk and of edges displaced at random, for a memory M
-(the time in which the past fades by e): K_x = 2 T / M, K_v = 2 T / M**2 and K_a = T / M**3 for T far below M; from T =
-2 M on they are kept at those of 2 M, about those of the last three edges. So one filter is a mean over many edges where
-they are dense, and a second difference of edges where they are rare. Gains come from a table, by the top two bits of T
-and by the level of the memory: a gain needs no precision, only the same sign of mistake everywhere.
+The gains are the steady-state Kalman filter's for a white jerk and for edges displaced at random. M is its memory: the
+time in which the past fades by e. For T far below M, K_x = 2 T / M, K_v = 2 T / M**2 and K_a = T / M**3. From T = 2 M
+on, the gains stay at their values for 2 M, about the gains of a fit to the last three edges. So the filter is a mean
+over many edges where they are dense, and a second difference of edges where they are rare. Gains come from a table, by
+the top two bits of T and by the level of the memory. They need no precision, only an error of the same sign everywhere.
 
-The memory. There are two bounds on what the motion may do, its jerk between impacts and its acceleration at one; they
-give a quiet and an agile memory (`edge_kalman_design` has the rule). The quiet one is used until |z| passes a bound,
-ALARM standard deviations of the mean of that many innovations for edges that err as much as they may: then the memory
-is the agile one at once, and grows again at GROWTH, a quarter, of the time that passes. An impact is noticed by some
-tenths of a count, and what came before it is forgotten in an agile memory; edges that err alone are no alarm.
+The memory. Two bounds on the motion give a quiet and an agile memory: the jerk between impacts, and the acceleration at
+an impact (`edge_kalman_design` has the rule). The quiet memory is used until |z| passes a bound: ALARM standard
+deviations of the mean of that many innovations, for edges with the largest stated error. Then the memory becomes agile
+at once. It grows again by GROWTH, a quarter, of the time that passes. An impact is noticed after some tenths of a
+count, and the motion before it is forgotten within an agile memory. A single displaced edge raises no alarm.
 
 Silence. Without an edge the axis is within its cell, which is as long as two edges may be apart, 1 + m counts. The line
-is held as that of `levant_edge` is: within -v and bound - v, where bound = (2 + 2 m) D 2**-l and 2**l <= s < 2**(l+1).
-A motion with even acceleration that stays in the cell never has a line of twice the bound. So at twice the bound the
-axis is at rest, v = a = 0. It is at rest too once s is half the range of the stamp, since slower edges cannot be
-distinguished from rest. The memory is then agile, and the next edge begins a motion. At standstill the velocity is
-exactly 0.
+is held as in `levant_edge`: within -v and bound - v, where bound = (2 + 2 m) D 2**-l and 2**l <= s < 2**(l+1). A motion
+with even acceleration that stays in the cell never has a line of twice the bound. So at twice the bound the axis is at
+rest, v = a = 0. It is at rest too once s is half the range of the stamp, since slower edges cannot be distinguished
+from rest. The memory is then agile, and the next edge begins a motion. At standstill the velocity is exactly 0.
 
-Bursts. Some encoders emit their edges several at once, after a silence that is no sign of a slower axis. An edge that
-finds the axis faster than the last bound allows, and faster than half of its speed before, shows such an encoder: see
-`levant_edge.refuted`. So does a jolt, see `bursts`: else an axis at rest would begin anew with every burst. For
+Bursts. Some encoders emit several edges at once, after a silence that does not mean a slower axis. An edge shows such
+an encoder if the axis is then faster than the last bound allows, and faster than half of its speed before: see
+`levant_edge.refuted`. So does a jolt, see `bursts`: without it an axis at rest would start again with every burst. For
 `bursts.doubt_samples` from then on the line is not held, and there is no rest by silence.
 
 A turn needs no care: an edge has one place, whichever way it is crossed.
 
 The scale. Where edges really stand may be known, by a map (`scale_map`): n is then the difference of the places of two
-edges. Without a map every edge is where its number says. The filter itself learns none, and averages errors that repeat
-every four edges like any others, over the edges of a memory. A map is changed with `restart` only, for the anchor's
-place is that of the map, too.
+edges. Without a map every edge is where its number says. The filter itself learns no places. It averages errors that
+repeat every four edges like any others, over the edges of a memory. A map is changed with `restart` only, because the
+anchor's place comes from the map, too.
 
 Start. The first sample, and a sample with `restart`, forget everything; u = 0 until the second edge. A start in motion
 is caught up in some agile memories.
 
 Saturation. v and u saturate at the velocity format (flag `velocity_saturated`); the distance and r saturate at the
-error's format (flag `error_saturated`), after which the place is that of the last edge, and the next edges recover a
-motion within the format. The acceleration saturates silently: as a limit it is part of the law, in float64 too. z is a
-mean of innovations and within their range.
+error's format (flag `error_saturated`). The place is then the last edge's, and the next edges recover a motion within
+the format. The acceleration saturates silently: as a limit it is part of the law, in float64 too. z is a mean of
+innovations and within their range.
 
 Limits. The count and the stamp may wrap: differences are modulo their widths. An interval of half the stamp's range or
 more only sets a new anchor.
 
-Source: Kalman 1960 for the filter; a memory that an alarm shortens, after Bar-Shalom, Li and Kirubarajan, Estimation
-with Applications to Tracking and Navigation (2001), section 11.2; its use on stamped edges, with gains in a table by
+Source: Kalman 1960 for the filter. Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and
+Navigation (2001), section 11.2, for a memory that an alarm shortens. Its use on stamped edges, with gains in a table by
 the time between them, is this project's.
 """
 
@@ -90,12 +89,12 @@ TOP = AGILE_LEVEL << LEVEL_BITS
 HALF = 1 << (LEVEL_BITS - 1)
 BLEND_BITS, KX_BITS = WIDTHS[BLEND], WIDTHS[KX]
 ANCHOR, FIRST, TIMED = range(3)
-"""The last edge is: the anchor itself; the first known edge; an edge to correct by."""
+"""The kind of the last edge: the anchor itself, the first known edge, or an edge to correct by."""
 
 
 @compiled
 def _time_of(params, stamp):
-    """Return a stamp in units, whose bits are all that is used."""
+    """Return a stamp in units of 2**`unit` clocks."""
     return stamp >> params.unit
 
 
@@ -135,7 +134,7 @@ def _turn(params, acceleration, time):
 
 @compiled
 def _displaced(params, state, number):
-    """Return by how much more an edge is out of its place than the anchor is, as the map of the scale has it."""
+    """Return how much further an edge is displaced than the anchor, by the map of the scale."""
     return place_of(params.scale, number).error - place_of(params.scale, state.number).error
 
 

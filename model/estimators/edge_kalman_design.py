@@ -1,38 +1,38 @@
 """Gains, formats, tables and state of `edge_kalman`, derived from the axis; `edge_kalman` defines the law.
 
-The symbols T, M, r, v, a and D are those of `edge_kalman`; q is a count, s the error of an edge (counts), J and C the
+`edge_kalman` defines the symbols T, M, r, v, a and D. q is a count, s the error of an edge (counts), J and C are the
 bounds on jerk and acceleration. Times are in units of 2**`unit` clocks, 1 clock unless the stamp has more than
 TIME_BITS bits; D is then the units in a sample.
 
-The rule. A memory M averages over the M / T edges in it, so the place of the axis is known to about s sqrt(T / M). What
-the motion may do unforeseen within M is J M**3 by its jerk, and C M**2 by a jump of its acceleration, at an impact. The
-two memories are those at which these are a constant share of each other:
+The rule. A memory M averages over the M / T edges in it, so the place of the axis is known to about s sqrt(T / M).
+Within M the motion may change unforeseen: by J M**3 through its jerk, and at an impact by C M**2 through a jump of its
+acceleration. At each of the two memories, this change is a constant share of the place's error:
 
     J M_quiet**3 = QUIET s q sqrt(T / M_quiet)            C M_agile**2 = AGILE s q sqrt(T / M_agile)
 
-and M_agile is at most M_quiet. s is the bound on an edge's error and, independent of it, the stamp's at the largest
-speed. LEVELS memories are used, of equal ratios between the two; their gains are those of the steady state at constant
-T (`riccati`), for a bandwidth of T / M a sample. QUIET, AGILE, ALARM and GROWTH were chosen by measurement, with the
-impact's C and the jerk of the paper's swing, and are the same for every axis.
+and M_agile is at most M_quiet. s combines the bound on an edge's error and, independent of it, the stamp's error at the
+largest speed. LEVELS memories are used, with equal ratios from one to the next. Their gains belong to the steady state
+at constant T (`riccati`), for a bandwidth of T / M a sample. QUIET, AGILE, ALARM and GROWTH were chosen by measurement,
+with the impact's C and the jerk of the paper's swing. They are the same for every axis.
 
-A row of the table is for a level and the top two bits of T, so M and T are those of the middle of the row, off by a
-fifth at most. K_v T and K_a T**2 are then too large by up to 1.22 and 1.5 at the row's longest T. The filter bears that
-for T up to 2.6 M, and diverges from 2.8 M on: for ever rarer edges the gains of a white jerk go to K_v T = 1.73 and
-K_a T**2 = 1.49, beyond the 1.5 and 1 of the last three edges. So they are those of T / M = INDEX_MAX at most, 1.46 and
-1.08. The columns are words of fixed formats, whose range follows from the largest entry:
+A row of the table is for a level and the top two bits of T. It is computed for the M and T in the middle of the row, at
+most a fifth off. K_v T and K_a T**2 are then too large by up to 1.22 and 1.5 at the row's longest T. The filter
+tolerates this for T up to 2.6 M, and diverges from 2.8 M on. For ever rarer edges the gains of a white jerk go to K_v T
+= 1.73 and K_a T**2 = 1.49. The last three edges give 1.5 and 1. So the gains are limited to those at T / M = INDEX_MAX,
+1.46 and 1.08. The columns are words of fixed formats, whose range follows from the largest entry:
 
-- `blend` UQ(0, 16): the share of r that the mean of r takes; `alarm`: the bound on that mean; `fall` UQ(2, 16): the
-  levels by which the memory grows over T;
-- `kx` UQ(0, 18), `kv` of 20 bits and `ka` of 24: the gains. Each resolves its least useful entry, at the shortest T and
-  the longest memory, to a few bits; a gain that is off by an eighth costs next to nothing.
+- `blend` UQ(0, 16): the share of r in the mean of r; `alarm`: the bound on this mean; `fall` UQ(2, 16): the growth of
+  the memory over T, in levels;
+- `kx` UQ(0, 18), `kv` of 20 bits and `ka` of 24: the gains. Each resolves its smallest entry, at the shortest T and the
+  longest memory, to a few bits: an error of an eighth in a gain has almost no effect.
 
 Formats.
 
 - `velocity` SQ(i, f): i holds twice the largest speed; f resolves sqrt(C q), the speed that C gives within half a
   count, to 2**-SPEED_BITS, and at least the slowest edges.
-- `motion`, the state v: GUARD_BITS more, as corrections are rounded and a rounding stays for a whole memory.
+- `motion`, the state v: GUARD_BITS more: corrections are rounded, and a rounding error stays for a whole memory.
 - `error`, r, and the state's place x: edges times D. i holds the edges that twice the largest speed makes in two
-  samples and two agile memories, in which a start in motion is caught up; f is that of the velocity and one more, less
+  samples and two agile memories: a start in motion is caught up in this time. f is one more than the velocity's, less
   the bits of D: a place off by half an LSB at every edge is a velocity off by a quarter of the output's LSB.
 - `acceleration`, in counts a sample per unit: i holds 2**ACCELERATION_BITS C, f turns the velocity by a quarter of its
   LSB over the longest memory.
@@ -60,17 +60,17 @@ from .estimate import EstimatorDesign, EstimatorGains
 from .riccati import steady_state
 
 QUIET = 1.6
-"""What the jerk may do within the quiet memory, in errors of the place."""
+"""The largest change of place by the jerk within the quiet memory, in errors of the place."""
 AGILE = 28.0
-"""What the acceleration may do within the agile memory, in errors of the place."""
+"""The largest change of place by the acceleration within the agile memory, in errors of the place."""
 ALARM = 4.0
-"""The mean of r that is an alarm, in its own standard deviations."""
+"""The mean of r that raises an alarm, in its own standard deviations."""
 GROWTH = 0.25
-"""How fast the memory grows, in memory per time: what has just begun is remembered from its beginning, at most."""
+"""The growth of the memory per time, below 1: the memory never reaches back beyond the alarm."""
 INDEX_MAX = 2.0
 """The largest T / M of the gains: at this one the filter is stable, with some room, over all times of a row."""
 ROOM = 5.0
-"""By how much farther apart than a count two edges may be, in errors of an edge."""
+"""The excess over a count of the distance of two edges, in errors of an edge."""
 LEAST_ROOM = 0.25
 """The least such distance, counts: the line has errors of its own."""
 TOLERATED = 0.5
@@ -99,7 +99,7 @@ STEPS = 40
 
 @dataclass(frozen=True)
 class Gains(EstimatorGains):
-    """The bounds that the memories follow from: an edge's error, counts; jerk, m/s^3; acceleration, m/s^2."""
+    """The bounds from which the memories follow: an edge's error, counts; jerk, m/s^3; acceleration, m/s^2."""
 
     edge_error_counts: float
     jerk_m_per_s3: float
@@ -159,10 +159,10 @@ class FloatParams(NamedTuple):
 class State(NamedTuple):
     """The anchor (`known` if its arrival was seen), the motion there, and how long it is remembered.
 
-    `number` and `stamp` (in units) are those of the last edge; `length` is the length of the last interval, bits, and
-    `level` the level of the memory. `place` is that of the axis beside the anchor, `mean` the mean of the innovations
-    (float: counts times units a sample); velocity and acceleration are words (float: counts a sample, and that per
-    unit).
+    `number` and `stamp` (in units) belong to the last edge. `length` is the length of the last interval, bits, and
+    `level` the level of the memory. `place` is the place of the axis beside the anchor, `mean` the mean of the
+    innovations (float: counts times units a sample). velocity and acceleration are words (float: counts a sample, and
+    counts a sample per unit).
     """
 
     running: int
@@ -187,7 +187,7 @@ class Design(EstimatorDesign):
     """Formats, tables and latency of the filter for an axis, derived as the module says.
 
     Args:
-        axis, gains: those of every estimator.
+        axis, gains: as of every estimator.
         scale: the map of the scale that the hardware is to have; None for none.
 
     Attributes:

@@ -1,8 +1,8 @@
 """The contract of a velocity estimator in the model: its gains, its design, and one step of its kernel.
 
-`EstimatorGains` and `EstimatorDesign` are the contract; `estimate` is the kernel for which every estimator registers
-two variants, one for the integer words of the hardware and one for the same algorithm in float64. To add an estimator,
-see `registry`.
+`EstimatorGains` and `EstimatorDesign` are the contract. `estimate` is the kernel. Every estimator registers two
+variants of it: one for the integer words of the hardware, and one for the same algorithm in float64. To add an
+estimator, see `registry`.
 """
 
 import math
@@ -122,8 +122,8 @@ class EstimatorDesign(ABC):
 def largest_step(axis: AxisRequirements) -> int:
     """Return the largest difference of two counts that a filter of counts takes.
 
-    That is what twice the largest speed moves in a sample, begun within a count, and one count for an edge out of
-    place; at most half of the count's range, for two counts differ by no more.
+    It is the motion of a sample at twice the largest speed, begun within a count, and one count for an edge out of
+    place. It is at most half of the count's range, because two counts differ by no more.
     """
     return min(math.floor(2 * axis.speed_max_counts_per_sample) + 2, 1 << (axis.count_width - 1))
 
@@ -139,7 +139,7 @@ def whole_counts(axis: AxisRequirements) -> SQ:
 def fraction_bits(axis: AxisRequirements, resolution_bits: int) -> int:
     """Return the fraction bits of a velocity whose LSB is at most sqrt(C') 2**-resolution_bits.
 
-    C' is the axis's bound on the acceleration in counts a sample^2; sqrt(C') is half of the minimax bound of a velocity
+    C' is the axis's bound on the acceleration in counts a sample^2. sqrt(C') is half of the minimax bound of a velocity
     from counts, 2 sqrt(C eps), with eps a count.
     """
     root = math.sqrt(axis.acceleration_max_m_per_s2 / axis.count_m) / axis.sample_hz
@@ -153,7 +153,7 @@ def estimate(params, state, seen, restart):
     Args:
         params: what a design's `params` (integer words) or `float_params` (the same algorithm in float64) returns.
         state: the state from `start` or from the previous call; an array in it is written in place.
-        seen: what the decoder shows; its count is a signed word that may have wrapped.
+        seen: the decoder's outputs; the count is a signed word and may have wrapped.
         restart: true to forget the past: this sample counts as the first.
 
     Returns:

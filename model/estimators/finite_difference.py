@@ -44,8 +44,8 @@ START = State(0, 0)
 class Design(EstimatorDesign):
     """Formats of the finite difference for an axis.
 
-    The velocity is a whole number of counts a sample; its range is twice the axis's largest speed, so that a loop that
-    overshoots is still read correctly. Beyond that range the velocity saturates, with the flag `velocity_saturated`.
+    The velocity is a whole number of counts a sample. Its range is twice the axis's largest speed, so an overshooting
+    loop is still read correctly. Beyond that range the velocity saturates, with the flag `velocity_saturated`.
     """
 
     name = "fdm"

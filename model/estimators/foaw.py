@@ -10,21 +10,21 @@ Per sample, with f the count, d the band, T the spacing of the taps in samples a
     best-fit   v = 6 sum_i (2 i - n) D_i / (n (n + 1) (n + 2) T)  the least-squares line's slope
 
 Both outputs use the window that the check of the end-fit gives. (A check of the least-squares line itself would take
-work that grows with the square of n, and gave no smaller error on the paper's signal at 1 and 10 kHz.) Continuing the
+work that grows with the square of n. It gave no smaller error on the paper's signal at 1 and 10 kHz.) Continuing the
 search to the largest n that passes, as the definition may be read, gave the same error or a larger one.
 
-`band_counts`, d: **a count is the position rounded down, so the counts of a uniform motion stay within one count of
-the line through any two of them**, and a smaller band does not suffice: two roundings in [0, 1) differ by less than 1.
-With half a count, uniform motion itself shortens the window. So d = 1; an encoder whose edges are displaced needs a
-band larger by that displacement.
+`band_counts`, d: **a count is the position rounded down: the counts of a uniform motion stay within one count of the
+line through any two of them**. A smaller band does not suffice: two roundings in [0, 1) differ by less than 1. With
+half a count, uniform motion itself shortens the window. So d = 1; an encoder whose edges are displaced needs a band
+larger by that displacement.
 
-`window_s`, N T: a line through the ends of a parabola |f''| = C departs from it by C n^2 / 8, which is d / 2 at
-n = 2 sqrt(d / C): half of the band is for curvature, half for the rounding. In a longer window only an accidental fit
-passes the check. At high rates the window is thousands of samples: `TAPS` of them, T apart, are searched, anew at every
+`window_s`, N T: a line through the ends of a parabola |f''| = C departs from it by C n^2 / 8. This is d / 2 at n = 2
+sqrt(d / C): half of the band is for curvature, half for the rounding. In a longer window only an accidental fit passes
+the check. At high rates the window is thousands of samples: `TAPS` of them, T apart, are searched, anew at every
 sample.
 
-Past counts come from `history`, which defines the behaviour before the window is full, at a wrap of the count, beyond
-the largest speed, and if only every M-th position is stored.
+Past counts come from `history`. It defines four cases: a window that is not yet full, a wrap of the count, a speed
+beyond the largest, and storage of only every M-th position.
 
 Formats, derived:
 
@@ -35,9 +35,9 @@ Formats, derived:
 - `velocity` SQ(i, f): i as in `history.change`, since both fits are averages of the changes with positive weights.
 - f: rounding toward zero, by less than 2**-ROUNDING_BITS of a count over the longest window, as in `window`.
 
-Limits. Standing for the window gives exactly 0. A step of more than two bands leaves one tap: it reads as its
-counts / T for T samples, then as 0; of a step beyond twice the largest speed, only the part up to that counts. After
-the first sample or a restart in motion the axis counts as having stood, as after a step of velocity.
+Limits. Standing for the window gives exactly 0. A step of more than two bands leaves one tap: it reads as its counts /
+T for T samples, then as 0. Of a step beyond twice the largest speed, only the part up to that speed counts. After the
+first sample or a restart in motion the axis counts as having stood, as after a step of velocity.
 
 Source: Janabi-Sharifi, Hayward, Chen, Discrete-time adaptive windowing for velocity estimation, IEEE Transactions on
 Control Systems Technology 2000.

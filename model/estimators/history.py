@@ -16,11 +16,11 @@ Formats, derived:
   is limited (flag `velocity_saturated`) and the rest of that step is forgotten. So the change over a window always
   fits, and a motion that is too fast reads as the largest velocity, not as an alias.
 - `age_bits`: the fewest bits that hold the window's length in stored positions. The memory has 2**age_bits words.
-- `width`: the change over the longest window is less than 2**(i-1) 2**age_bits every, so one more bit, the sign, makes
+- `width`: the change over the longest window is less than 2**(i-1) 2**age_bits every. So one more bit, the sign, makes
   the difference of two positions exact modulo 2**width: i + age_bits + log2(every). The total travel of the axis and
   the number of wraps of its count do not matter.
 - `every`, a power of two: 1, unless 2**age_bits words of `width` bits are more than `MEMORY_BITS`. Otherwise estimates
-  are made every `every` samples and held between, so that a window remains a whole number of stored positions and the
+  are made every `every` samples and held between. So a window remains a whole number of stored positions, and the
   difference over it exact. The hold adds at most every - 1 samples to the age of a window of thousands of samples.
 """
 

@@ -8,17 +8,17 @@ Position, velocity and acceleration, x, v and a, in counts and sample periods; p
 
 x is held as its distance from the last count, `lead` = x - f, so that the count may wrap. The output `u` is v. This is
 the filter of a motion driven by white jerk. With K_a = 0, a is held at 0 and it is the filter of white acceleration,
-with two integrators: `Design.words_for(..., integrators=2)`. On the paper's signal two integrators lag by
-sqrt(2)/omega whatever the motion, three only by the change of the acceleration in that time: 0.16 against 0.09 mm/s at
-1 MHz with the gains below, and 0.16 against 0.02 at the best bandwidth of each. So three are the default.
+with two integrators: `Design.words_for(..., integrators=2)`. On the paper's signal two integrators lag by sqrt(2)/omega
+whatever the motion; three lag only by the change of the acceleration in that time. At 1 MHz with the gains below: 0.16
+mm/s for two and 0.09 mm/s for three; at the best bandwidth of each: 0.16 and 0.02 mm/s. So three are the default.
 
 Source: Belanger, Dobrovolny, Helmy, Zhang, International Journal of Robotics Research 17 (1998), 1225.
 
 Noise model. The quantisation error and the acceleration are two stationary signals with exponential correlation: the
 error has RMS q / sqrt(12), and the acceleration, uniform within the axis's C, has RMS C / sqrt(3). The correlation
-times (`noise_time_s`, `acceleration_time_s`) are by default 2 sqrt(q/C), the minimax window of an error of one count:
-in a shorter time, neither does a change of acceleration show in the counts nor does an axis that starts to move reach
-the next count. Either signal is modelled as a white one with the same power below those rates:
+times (`noise_time_s`, `acceleration_time_s`) are by default 2 sqrt(q/C), the minimax window of an error of one count.
+In a shorter time a change of acceleration does not show in the counts. Nor does an axis that starts to move reach the
+next count. Either signal is modelled as a white one with the same power below those rates:
 
     R = rms^2 coth(tau / (2 time))        counts^2: gives the variance of the mean of many samples
     Q = 2 rms^2 (1 - exp(-tau / time))    mean square change of the acceleration in a sample
@@ -35,11 +35,11 @@ Formats, derived. C' = C tau^2 / q; 2**reach is at least 1/h and at least 1.
   within a count, and one count for an edge out of place. A larger difference saturates (flag `velocity_saturated`): the
   excess is a displacement of the scale, without later effect.
 - The states are then bounded by the norms (sums of absolute impulse responses) from the difference of counts to v, a
-  and lead, `norms`, times `step_max`. Their formats hold that bound plus one of their unit; with the gains of a noise
-  model nothing else saturates. With other gains `lead` may saturate (flag `innovation_saturated`; it drags x along),
-  or v or a (flag `state_saturated`).
+  and lead: `norms`, times `step_max`. Their formats hold that bound plus one of their unit; with the gains of a noise
+  model nothing else saturates. With other gains `lead` may saturate (flag `innovation_saturated`; it drags x along), or
+  v or a (flag `state_saturated`).
 - f, fraction bits of the velocity: an LSB is at most sqrt(C') 2**-RESOLUTION_BITS.
-- lead, v and a have GUARD_BITS more than f, v another `reach` and a another twice `reach`, since a state's rounding
+- lead, v and a have GUARD_BITS more than f; v has another `reach`, and a another twice `reach`: a state's rounding
   error appears in the velocity 1, 1/h and 1/h^2 times. An error of r appears h times, so the operand r has reach - 1
   bits less than lead. All products, the sums' narrower parts and r are floored. In the worst case all floors add up to
   ERROR_NORM 2**-GUARD_BITS of an LSB of the velocity, which is less than a half: *at constant n counts a sample the
@@ -49,8 +49,8 @@ Formats, derived. C' = C tau^2 / q; 2**reach is at least 1/h and at least 1.
   gains of the designed h, or of any larger h that the words hold; with others the last bits may move.
 - int64 holds 62 bits: if the formats do not fit, f is reduced.
 
-Range of the gains. The poles are those of z^3 + (K_x + K_v + K_a/2 - 3) z^2 + (3 - 2 K_x - K_v + K_a/2) z + K_x - 1. By
-Jury's criterion they are stable if and only if
+Range of the gains. The poles are roots of the polynomial z^3 + (K_x + K_v + K_a/2 - 3) z^2 + (3 - 2 K_x - K_v + K_a/2)
+z + K_x - 1. By Jury's criterion they are stable if and only if
 
     0 < K_x < 2,    0 < K_v,    0 < K_a,    2 K_x + K_v < 4,    K_a (2 - K_x) < 2 K_x K_v
 
@@ -88,7 +88,7 @@ ERROR_NORM = 18.0
 HEADROOM_BITS = 2
 """Gains of position and velocity may be raised to at most 2**HEADROOM_BITS times the designed ones at run time."""
 RATIOS = tuple(2 ** (step / 64) for step in range(32, -1, -1))
-"""What they may be lowered by, and the gain of the acceleration raised by, is the first of these that is stable."""
+"""The first stable one of these factors lowers those gains and raises the gain of the acceleration."""
 STABLE = 0.75
 """Largest part of 2 K_x K_v that K_a (2 - K_x) may be, where 1 is the limit of stability."""
 STEPS = 12

@@ -1,4 +1,4 @@
-"""Two kept edges and the last one: what the M/T estimators know of a sample, and the velocity that they make of it.
+"""Two kept edges and the last one: the state of the M/T estimators, and their velocity.
 
 With c clocks a sample, and for the last edge its number N on the scale and its stamp S, in clocks:
 
@@ -7,8 +7,8 @@ With c clocks a sample, and for the last edge its number N on the scale and its 
 
 Every half window, of `half` samples, the newer of two kept edges becomes the older and the last edge the newer.
 `observe` holds |N - N'|, its sign and S - S' while the older edge is the last one. Before there are two edges, and once
-the last one is forgotten, |N - N'| is 0. The kernels are those of every estimator whose hardware rounds this velocity
-exactly, by whatever arithmetic: `mt` says what it is good for and guarantees, `mt_divisionless` is the other.
+the last one is forgotten, |N - N'| is 0. Every estimator whose hardware rounds this velocity exactly, by any
+arithmetic, uses these kernels: `mt` says what it is good for and guarantees, `mt_divisionless` is the other.
 
 Bursts. Some encoders emit their edges several at once, after a silence that is no sign of a slower axis. An edge shows
 such an encoder if the last age before it was more than 3/2 counts at the new speed: 2 |N - N'| A > 3 (S - S'). For
@@ -16,13 +16,13 @@ such an encoder if the last age before it was more than 3/2 counts at the new sp
 
 Formats, derived.
 
-- `velocity` and the quotient are those of `period`.
+- `velocity` and the quotient have the formats of `period`.
 - A sample is at most half as long as with `period`: a window of one sample then fits stamps, and a dividend, below
   c 2**(stamp_width + 7), int64.
-- `edges_max`: the decoder counts at most one edge a clock, so that between two kept edges and the last one are at most
-  c (2 half + 1); more are limited. The dividend is at most c edges_max 2**(f + 1), and may have `DIVIDEND_BITS`.
-- An edge is forgotten after AGE_LIMIT of the stamp's range, as in `cycle_times`. The older edge was not older than that
-  when it was taken, at most a window ago, so with a window of at most WINDOW_LIMIT of the range no time aliases.
+- `edges_max`: the decoder counts at most one edge a clock: between two kept edges and the last one are at most c (2
+  half + 1); more are limited. The dividend is at most c edges_max 2**(f + 1), and may have `DIVIDEND_BITS`.
+- An edge is forgotten after AGE_LIMIT of the stamp's range, as in `cycle_times`. The older edge was no older than that
+  when it was taken, at most a window ago. So with a window of at most WINDOW_LIMIT of the range no time aliases.
 
 The first sample, and a sample with a restart, forget the past; an edge is known once one came since.
 """
@@ -213,7 +213,7 @@ def observe(params, edges, seen, restart):
         moved = 0
     elif passed:
         moved, down, time = min(abs(between), params.edges_max), int(between < 0), passed
-    # An edge that comes after so long a silence, in a motion so fast, shows that edges come in bursts.
+    # An edge after so long a silence, in so fast a motion, shows that edges come in bursts.
     doubt = max(edges.doubt - 1, 0)
     if not known:
         doubt = 0

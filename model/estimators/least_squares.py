@@ -13,7 +13,7 @@ with two points is the plain difference of `window`.
 Orders. A fit is exact on polynomials of its order: at constant acceleration order 1 is late by half of its window,
 n T / 2, and orders 2 and 3 are not late. It is paid for in noise: see the numbers below.
 
-Guarantee. Let W = n T be the window, |f''| <= c counts/sample^2, and let the count be the position displaced by at most
+Guarantee. Let W = n T be the window, and |f''| <= c counts/sample^2. Let the count be the position displaced by at most
 eps in either direction. With w_i the weights of the counts for T = 1, the error of v is at most
 
     B c W + A eps / W         A = n sum |w_i|,    B = (1/n) integral |sum_{i > t} w_i (i - t)| dt
@@ -21,15 +21,16 @@ eps in either direction. With w_i the weights of the counts for T = 1, the error
 
 by Taylor's formula with Peano's kernel. A B is 1 for two points, and 1.41 for a line through 16; 3.9 and 7.8 for orders
 2 and 3. **So under a bound of the acceleration alone order 1 guarantees the most on every axis, and is the default**;
-its window is that minimax one, with eps half a count as in `window`. What more points buy is not in the guarantee:
-errors of counts that are independent add up to an RMS of S / W, S = n sqrt(sum w_i^2 / 12), 0.41 counts for two points,
-0.23 for a line through 16. Orders 2 and 3 are for a motion whose jerk has a bound, which is then worth a longer window:
-with |f'''| <= j, an error of B' j W^2 + A eps / W, least at W = (A eps / (2 B' j))^(1/3). `numbers` has A, B, B' and S.
+its window is that minimax one, with eps half a count as in `window`. More points do not improve the guarantee, but the
+RMS: independent errors of counts add up to an RMS of S / W, S = n sqrt(sum w_i^2 / 12); S is 0.41 counts for two
+points, 0.23 for a line through 16. Orders 2 and 3 are for a motion whose jerk has a bound, which allows a longer
+window. With |f'''| <= j the error is B' j W^2 + A eps / W, least at W = (A eps / (2 B' j))^(1/3). `numbers` has A, B,
+B' and S.
 
 Points. `POINTS` of them unless the samples have fewer clocks or the window fewer samples: each takes a clock.
 
-Past counts come from `history`, which defines the behaviour before the window is full, at a wrap of the count, beyond
-the largest speed, and if only every M-th position is stored; then T is a multiple of M, and v is held between.
+Past counts come from `history`. It defines four cases: a window that is not yet full, a wrap of the count, a speed
+beyond the largest, and storage of only every M-th position. Then T is a multiple of M, and v is held between.
 
 Formats, derived:
 
@@ -37,10 +38,10 @@ Formats, derived:
   den T: v is the exact rational number, rounded toward zero. A constant speed reads exactly.
 - |D_i| <= i T times the largest change of a sample, so the running sum is at most `largest_sum`, which has at most
   `SUM_BITS`: a longer window is refused with the range. The divisor is then below 2**35, and 2**20 its factor.
-- `velocity` SQ(i, f): v is a weighted sum of the changes over T, whose weights' absolute values add up to `gain`: 1 for
+- `velocity` SQ(i, f): v is a weighted sum of the changes over T. The weights' absolute values add up to `gain`: 1 for
   order 1, below 2 and 10/3 for orders 2 and 3. i holds `gain` times the largest change, so v cannot overflow.
-- f: rounding by less than 2**-ROUNDING_BITS counts over the window, as in `window`, where the errors of counts have an
-  RMS of 0.16 and more.
+- f: rounding by less than 2**-ROUNDING_BITS counts over the window, as in `window`; the errors of counts have an RMS of
+  0.16 and more.
 
 Limits. Standing for the window gives exactly 0. After the first sample or a restart in motion the axis counts as having
 stood, as after a step of velocity: an order above 1 then overshoots, to `gain` times the speed at most.

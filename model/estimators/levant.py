@@ -15,8 +15,8 @@ Source: Chawda, Celik, O'Malley, World Haptics 2011, equations of the first-orde
 Formats, derived. Let lam = lambda tau / sqrt(q) and alp = alpha tau^2 / q be the gains per sample.
 
 - `velocity` SQ(i, f): i holds twice the largest speed, since u oscillates about the true velocity.
-- f, the fraction bits of e, u and u1 alike (x + u and u1 - alpha are then exact): alpha's word is at least
-  2**ALPHA_BITS, so its relative error is at most 2**-(ALPHA_BITS+1); and rounding u to f bits stays within the position
+- f, the fraction bits of e, u and u1: all alike, so that x + u and u1 - alpha are exact. alpha's word is at least
+  2**ALPHA_BITS, so its relative error is at most 2**-(ALPHA_BITS+1). Rounding u to f bits stays within the position
   budget below.
 - `root`, the format of sqrt(|e|), and f. The integer root rounds down, so half of its LSB is added back (a constant
   bit below it): no bias, and an error of at most half an LSB. Together with half an LSB of u, rounding changes u by at
@@ -24,8 +24,8 @@ Formats, derived. Let lam = lambda tau / sqrt(q) and alp = alpha tau^2 / q be th
   eta <= 2 sqrt(|e|) delta / lam + (delta / lam)^2: *the fixed-point estimator is the exact one on a position perturbed
   by eta*. At |e| = 1 count, where quantisation keeps e, either part is held to POSITION_BUDGET / 2 counts.
 - `error` SQ(i, f): lam sqrt(e_max) is at least twice the largest speed, so a velocity step across the whole range is
-  still followed; but e_max is never more than the range of the count. A larger e saturates (flag `error_saturated`),
-  which drags x along.
+  still followed. e_max is never more than the range of the count. A larger e saturates (flag `error_saturated`), which
+  drags x along.
 - `lambda` UQ, GAIN_BITS wide, with two bits of headroom above the designed gain for changes at run time; `alpha` has
   the same headroom, and may be lowered by LOWER_BITS.
 
@@ -33,20 +33,20 @@ Range of the gains. Three kinds of words make an estimate that is wrong without 
 
 - alpha = 0: u1 never moves.
 - a lambda near 0: nothing damps the swing of u1 about a constant speed. The swing falls by a factor of lambda and
-  sqrt(alpha) alone, and its last size is some 2 alpha^1.5 / lambda counts a sample: hence UNDAMPED.
-- a lambda above 2, for the explicit sign alone: an error below lambda^2 / 4 changes its sign at every sample, so that
-  u1 stands still while it is less than about lambda^2 / 4 counts a sample away from the speed. `LAMBDA_MAX` keeps that
-  to a count a sample.
+  sqrt(alpha) alone. Its last size is some 2 alpha^1.5 / lambda counts a sample: hence UNDAMPED.
+- a lambda above 2, for the explicit sign alone. An error below lambda^2 / 4 changes its sign at every sample. So u1
+  stands still while it is less than about lambda^2 / 4 counts a sample away from the speed. `LAMBDA_MAX` keeps that to
+  a count a sample.
 
-A design whose own gains are beyond one of these limits has that limit at its own gains.
+If a design's own gains exceed one of these limits, the limit is at its own gains.
 
 Both states saturate at the velocity format (flag `velocity_saturated`).
 
-Limits. The count may wrap. The first sample, and a sample with `restart`, begin with x = count and u1 = 0: a start from
-rest has no transient; a start in motion at u0 has the transient of a step of u0, which u overshoots by about 40 % and
-follows within u0 (1 + p) / (alpha (1 - p)), p = exp(-pi / sqrt(8 alpha / lambda^2 - 1)), which is 1.96 u0 / alpha with
-the default gains, as it does the largest step (0.3 m/s with C = 12 m/s^2: 0.42 m/s at most, 43 ms). Up to the largest
-speed nothing saturates after that transient. At standstill u and u1 never come to rest but chatter by
+Limits. The count may wrap. The first sample, and a sample with `restart`, begin with x = count and u1 = 0. A start from
+rest has no transient. A start in motion at u0 has the transient of a step of u0. u overshoots the step by about 40 %
+and follows within u0 (1 + p) / (alpha (1 - p)), p = exp(-pi / sqrt(8 alpha / lambda^2 - 1)). With the default gains
+this is 1.96 u0 / alpha. It holds for the largest step, too (0.3 m/s with C = 12 m/s^2: 0.42 m/s at most, 43 ms). Up to
+the largest speed nothing saturates after that transient. At standstill u and u1 never come to rest but chatter by
 lambda sqrt(alpha tau^2) and alpha tau; `levant_semi_implicit` comes to rest.
 
 `levant_semi_implicit`, `levant_implicit` and `levant_adaptive` share this module's gains, design and helper functions.
@@ -211,7 +211,7 @@ class Design(EstimatorDesign):
         )
 
     def _most(self, designed: int) -> int:
-        """Return the largest word of lambda, for that of the designed one."""
+        """Return the largest word of lambda, from the word of the designed lambda."""
         return max(designed, min(math.floor(LAMBDA_MAX * 2**self.lambda_.f), self.lambda_.max))
 
     def _least(self, f_max: int) -> tuple[float, float]:

@@ -5,50 +5,51 @@ L_max = alpha / 1.1,
 
     L = L_max 2**-j,     alpha_j = alpha 2**-j,     lambda_j = lambda 2**(-j/2)
 
-Level 0 is the fixed-gain estimator for the axis's bound C; every further level reduces the noise of a count, about
-sqrt(L q), by sqrt(2), and makes the estimator slower; the levels below 0 are for an impact beyond C. All times below
+Level 0 is the fixed-gain estimator for the axis's bound C. Every further level reduces the noise of a count, about
+sqrt(L q), by sqrt(2), and makes the estimator slower. The levels below 0 are for an impact beyond C. All times below
 are in samples, all lengths in counts:
 
-1. *Time on one side*: t counts the samples since b last changed its sign (`elapsed`), and `reached` is the last level
-   whose L explains an excursion of LOST counts in t: L >= EXCESS LOST / t^2. It starts again at 0 with every change.
+1. *Time on one side*: t counts the samples since b last changed its sign (`elapsed`). `reached` is the last level whose
+   L explains an excursion of LOST counts in t: L >= EXCESS LOST / t^2. t starts again at 0 with every change of sign.
 2. *Lost*: |b| >= LOST, more than quantisation of one count can cause. Then j falls at once to `reached`, if j is above.
-   If |b| grows to twice as much, and every time it has doubled again, j falls to `reached` or by two, whichever is
-   lower: two levels multiply L by 4 and lambda by 2. The first doubling leads no further than level 0, which any
-   acceleration up to C may need; those after it down to -RAISED.
-3. *Calm*: if |b| < LOST for HOLD windows of 2 / sqrt(L), with L of the present level, j rises by one: from level 0 to
-   the last level in less than 3.5 times the hold of the last. From -RAISED to 0 it takes less than 2 holds of level 0.
+   Each time |b| has doubled again, j falls to `reached` or by two, whichever is lower: two levels multiply L by 4 and
+   lambda by 2. The first doubling leads no further than level 0, because any acceleration up to C may need level 0.
+   Later doublings lead down to -RAISED.
+3. *Calm*: if |b| < LOST for HOLD windows of 2 / sqrt(L), with L of the present level, j rises by one. From level 0 to
+   the last level this takes less than 3.5 times the hold of the last level. From -RAISED to 0 it takes less than 2
+   holds of level 0.
 
-The law needs no divider and no table: levels are a factor of 2 apart, so alpha_j is a shift, and lambda_j is a shift
-and, for odd j, the root of half the radicand. The time thresholds are two constants, shifted, with TIME_BITS fraction
-bits.
+The law needs no divider and no table. Levels are a factor of 2 apart, so alpha_j is a shift. lambda_j is a shift too;
+for odd j it takes the root of half the radicand. The time thresholds are two constants, shifted, with TIME_BITS
+fraction bits.
 
-*Guarantee.* Let a signal with |f''| <= A leave a state of no error. Until b is lost, the error of u grows by at most
-A tau a sample, since both corrections pull back, and its sum, the position error, is at most LOST + 1 counts. So
-*the error of u is at most sqrt(2 (LOST + 1) A q) = 2.45 sqrt(A q) until the loss, and an acceleration A out of rest is
-seen within sqrt(2 (LOST + 1) q / A) = 2.45 sqrt(q / A)*, both a sample longer, however small L was. Fixed gains for
-exactly that A give errors up to 1.7 sqrt(A q). If the sign changed when the acceleration began, the required L is
-EXCESS LOST / (2 (LOST + 1)) A = 2.7 A or more, which is enough. At the loss u steps by lambda_j sqrt(beyond), so that
-its error may become lambda_j sqrt(LOST + 1) on the other side: at most the error that the fixed gains of level 0 can
-always make.
+*Guarantee.* Let a signal with |f''| <= A start from a state without error. Until b is lost, the error of u grows by at
+most A tau a sample, since both corrections pull back. Its sum, the position error, is at most LOST + 1 counts. So *the
+error of u is at most sqrt(2 (LOST + 1) A q) = 2.45 sqrt(A q) until the loss. An acceleration A out of rest is seen
+within sqrt(2 (LOST + 1) q / A) = 2.45 sqrt(q / A)*. Both take a sample longer, and neither depends on L. Fixed gains
+for exactly that A give errors up to 1.7 sqrt(A q). If the sign changed when the acceleration began, the required L is
+at least EXCESS LOST / (2 (LOST + 1)) A = 2.7 A. This is enough. At the loss u steps by lambda_j sqrt(beyond). Its error
+may then become lambda_j sqrt(LOST + 1) on the other side: at most the largest error that the fixed gains of level 0 can
+make.
 
-*Beyond C.* For A up to 4^m 1.1 L_max, with 1 <= m < RAISED / 2, level -2m is reached once |b| is B = LOST 2^(m+1). Up
-to there the error of u is at most sqrt(2 (B + 1) A q), as above. There alpha_j >= A, so that it falls with sqrt(|b|) at
-the rate lambda_j, and u steps by half of lambda_j sqrt(B); in these terms, with lambda_j >= 0.95 sqrt(A) and B >= 8, it
-is at most 1.02 sqrt(B A q) after that step, and 0.63 when |b| has doubled, which the next step, of 1.35, turns round.
-So |b| <= 2 B, and *the error of u is at most sqrt(2 (B + 1) A q), or, on the other side, the whole
-lambda_j sqrt(2 B + 1) of level j = -2m - 2*, each a sample longer. For A = 4.4 C, the largest error of an impact of
-51 m/s^2 with C = 12, that is 30 and 57 mm/s, and 27 was measured (25 impacts from 0.01 to 0.6 m/s, 1 MHz); with the
-gains of level 0 the error grows until the motion ends, to 237 mm/s then. With m = RAISED / 2, up to 17.6 C, there is no
-further level, and |b| may come to 4.2 B; 57 mm/s was measured at 190 m/s^2.
+*Beyond C.* Let A be up to 4^m 1.1 L_max, with 1 <= m < RAISED / 2. Level -2m is reached once |b| is B = LOST 2^(m+1).
+Up to there the error of u is at most sqrt(2 (B + 1) A q), as above. There alpha_j >= A. So the error of u falls with
+sqrt(|b|) at the rate lambda_j, and u steps by half of lambda_j sqrt(B). In these terms, with lambda_j >= 0.95 sqrt(A)
+and B >= 8, the error is then at most 1.02 sqrt(B A q). It is 0.63 sqrt(B A q) when |b| has doubled. The next step, of
+1.35 sqrt(B A q), turns the error round. So |b| <= 2 B, and *the error of u is at most sqrt(2 (B + 1) A q); on the other
+side it is at most the whole lambda_j sqrt(2 B + 1) of level j = -2m - 2*. Both take a sample longer. For an impact of
+51 m/s^2 with C = 12, A = 4.4 C, these largest errors are 30 and 57 mm/s. Measured was 27 (25 impacts from 0.01 to 0.6
+m/s, 1 MHz). With the gains of level 0 the error grows until the motion ends, to 237 mm/s then. With m = RAISED / 2, up
+to 17.6 C, there is no further level, and |b| may reach 4.2 B. Measured was 57 mm/s at 190 m/s^2.
 
-*Limitations.* (a) The transient above, up to sqrt(2) times that of fixed gains, is the price. (b) Out of rest the sign
-often changes with the first count, not with the acceleration; then t is too short, L too large, and u overshoots: 6.6
-sqrt(A q) at A = 1 m/s^2 with C = 12 (measured, largest of 24 steps out of rest and slow motion, 100 kHz; fixed gains:
-4.0). (c) If b was on the side of the acceleration long before, t is too long, and only the doublings raise L. (d) A
-signal that is calm and lost in turn, such as a sine whose |f''| passes 0, keeps changing L, and u1, which carries the
-excursions, may be worse than with fixed gains (table): so u is the default. (e) |f''| > 2**RAISED L_max is not
-followed, as |f''| > L_max with fixed gains. (f) Below about sqrt(L_max / q) samples a second, an acceleration moves b
-by more than LOST counts in a sample: the additional sample is then the main part of the bounds. (g) Noise of LOST
+*Limitations.* (a) The transient above is up to sqrt(2) times larger than with fixed gains. (b) Out of rest the sign
+often changes with the first count, not with the acceleration. Then t is too short, L too large, and u overshoots: 6.6
+sqrt(A q) at A = 1 m/s^2 with C = 12; with fixed gains 4.0 (measured, largest of 24 steps out of rest and slow motion,
+100 kHz). (c) If b was on the side of the acceleration long before, t is too long, and only the doublings raise L. (d) A
+signal that is calm and lost in turn keeps changing L, for instance a sine whose |f''| passes 0. u1 carries the
+excursions and may be worse than with fixed gains (table). So u is the default output. (e) |f''| > 2**RAISED L_max is
+not followed, as |f''| > L_max with fixed gains. (f) Below about sqrt(L_max / q) samples a second, an acceleration moves
+b by more than LOST counts in a sample: the additional sample is then the main part of the bounds. (g) Noise of LOST
 counts keeps L large.
 
 Laws compared: RMS (largest) error of u, mm/s, at 100 kHz in float64, q = 1 um. Paper's signal over 1 to 3 s; a hit at
@@ -67,13 +68,13 @@ keeps its accuracy; the law is this project's.
 
 Formats are as in `levant_semi_implicit`, except:
 
-- `levels`: the number of halvings of L, at most LEVELS (noise over a range of 64); not beyond the L whose window is
-  the time to the largest speed, 2 sqrt(q / L) = speed_max / C, since a slower estimate averages whole strokes; and not
-  more than the fraction bits of int64 allow.
-- f, the fraction bits of b, u and u1: alpha at the last level has at least LEAST_ALPHA_BITS below its top bit, so that
-  its shift, which rounds down, changes it by at most 2**-LEAST_ALPHA_BITS; and the position budget holds for lambda at
-  the last level. The product of lambda and root is shifted by the level without loss, and then rounded. At odd levels
-  the root is that of half the radicand, so delta = lambda_j sqrt(2) 2**-(root.f+1) + 2**-(f+1) there.
+- `levels`: the number of halvings of L, at most LEVELS: noise then spans a factor of 64. L has no window longer than
+  the time to the largest speed, 2 sqrt(q / L) = speed_max / C, since a slower estimate averages whole strokes. The
+  fraction bits of int64 are a third limit.
+- f, the fraction bits of b, u and u1: alpha at the last level has at least LEAST_ALPHA_BITS below its top bit. Its
+  shift rounds down, and so changes it by at most 2**-LEAST_ALPHA_BITS. The position budget holds for lambda at the last
+  level. The product of lambda and root is shifted by the level without loss, and then rounded. At odd levels the root
+  is taken of half the radicand, so delta = lambda_j sqrt(2) 2**-(root.f+1) + 2**-(f+1) there.
 - `elapsed` and `calm` stop once they can change no decision, so they cannot overflow. The thresholds follow the
   designed gains, not those set at run time; at the first sample j is 0.
 - A single rounding may decide a loss, so fixed-point and real trajectories diverge. Below 1 MHz the RMS of a single
@@ -125,7 +126,7 @@ class Law(NamedTuple):
 
 
 class Params(NamedTuple):
-    """Parameters of `levant`, those of the adaptation, and the bits that the product loses by the largest shift."""
+    """Parameters of `levant` and of the adaptation, and the bits that the largest shift takes from the product."""
 
     levant: levant.Params
     law: Law
@@ -192,7 +193,7 @@ class Design(levant_semi_implicit.Design):
         return bits(self.levels)
 
     def _check_raised(self, gains: Gains) -> None:
-        """Refuse gains that fit int64 at level 0 alone: alpha, and the step of u before its limit."""
+        """Refuse gains that overflow int64 at a level other than 0: alpha, and the step of u before its limit."""
         limits = self.root.i + RAISED // 2, RAISED
         for word, (name, value), bits in zip(self.words, vars(gains).items(), limits, strict=False):
             most = 2.0 ** (61 - HEADROOM_BITS - self.velocity.f - bits) * word.si_per_unit

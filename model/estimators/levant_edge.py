@@ -1,63 +1,63 @@
 """Velocity from the clock stamps of the encoder's edges: a sliding-mode differentiator of events, in fixed point.
 
-At an edge the position is known to a clock; between edges it is not known. So the error is taken at an edge, between
-the place predicted for it over the interval T and its true place, and nothing is corrected between edges. With D clocks
-a sample, v in counts a sample, a in counts a sample per clock, T and s in clocks, L the bits of T
-(2**(L-1) <= T < 2**L), and n the edges passed (0 if the same edge is crossed back), at every edge in use:
+At an edge the position is known to a clock; between edges it is unknown. So nothing is corrected between edges. At an
+edge, the error is the difference of its predicted place, over the interval T, and its true place. D is the clocks of a
+sample; v is in counts a sample, a in counts a sample per clock, T and s in clocks. L is the bits of T (2**(L-1) <= T <
+2**L). n is the edges passed, 0 if the same edge is crossed back. At every edge in use:
 
     E = (v + a T/2) T - (n D + place[this edge] - place[last edge])
     v <- v + a T - min(|E| / T, lambda sqrt(|E| 2**L)) sign(E)            |E| >= D: without the limit by lambda
     a <- a - min(change of v / 2**L, alpha 2**L) sign(E)                  |a| <= 2**ACCELERATION_BITS C, or next above
 
-and at every sample, s clocks after that edge (the anchor), u = v + a s; this line is the output, `u`. Which edges are
-in use is said in `levant_edge_anchor`.
+and at every sample, s clocks after that edge (the anchor), u = v + a s; this line is the output, `u`.
+`levant_edge_anchor` defines which edges are in use.
 
-The two minima are the sliding mode: the square root and the sign of the error, or, where those would pass the surface
-E = 0, the step that ends on it (the implicit discretisation: no chatter at any rate). The change of a is no more than
-2**-L of that of v: with lambda^2 below alpha, down to a lambda of 0, a would swing from edge to edge.
+The two minima are the sliding mode. One is the square root and the sign of the error. The other is the step that ends
+on the surface E = 0; it is used where the first would pass the surface. This is the implicit discretisation: no chatter
+at any rate. The change of a is at most 2**-L of the change of v. Otherwise, with lambda^2 below alpha, down to a lambda
+of 0, a would swing from edge to edge.
 
 |E| / T alone gives v = n D / T + a T/2: the mean velocity of the interval, extrapolated by half of it. In a, division
 by 2**L instead of T needs no second division, and it stabilises the loop: for constant T and g = T / 2**L in (1/2, 1],
 z^2 - (1 - g/2) z + g/2 = 0, |z| <= 0.71.
 
-Lost. lambda limits the correction of errors of less than a count, |E| < D: no more comes from edges that are half a
-count out of place. A larger error says that the estimate has lost the motion, whose acceleration is beyond the gains or
-beyond the format of a. Then v begins anew on the surface, from the mean velocity between these two edges, and no place
-is learnt from E. Limited, it would be left behind; and v, which takes in a T at every edge, would go to its format's
-end, where lambda is too low to hold it. In an interval of more than `mantissa` bits neither limit applies: no error
-that an axis makes reaches them.
+Lost. lambda limits the correction of errors of less than a count, |E| < D. Edges that are half a count out of place
+cause no larger error. At a larger error the estimate has lost the motion: the acceleration is beyond the gains, or
+beyond the format of a. Then v starts again on the surface, from the mean velocity between these two edges, and no place
+is learnt from E. With the limit, the estimate would be left behind: v adds a T at every edge, and would run to the end
+of its format, where lambda is too low to hold it. In an interval of more than `mantissa` bits neither limit applies: no
+error that an axis makes reaches them.
 
-The places of edges. On a real scale the four kinds of edges (by pin and polarity, in the upward sense) are out of
+The places of edges. A real scale has four kinds of edges, by pin and polarity in the upward sense. They are out of
 place by up to half a count. `place` holds the displacements, times D. After a full cycle in one direction, an edge
-moves the place of its own kind and that of the last edge apart by E 2**-LEARN_SHIFT, with |E| limited to D/4 to D/2.
-One of the four unknowns is the origin, which the symmetric step does not move. For the two patterns of a cycle that
-steady speed excites, the loop from places over v and a to E is 2 and (1 + j) / (1 - g/2): its real part is positive, so
-learning is stable with any step less than 1/4; it takes some ten cycles. (With g = 1, and v corrected by a as well, it
-is not stable: see the table.) The residual of an interval cut by k bits is weighted by 2**-k: slow motion learns
-slowly.
+moves two places apart by E 2**-LEARN_SHIFT: the places of its own kind and of the last edge's kind. For this, |E| is
+limited to D/4 to D/2. One of the four unknowns is the origin, which the symmetric step does not move. Steady speed
+excites two patterns of a cycle. For these, the loop from places over v and a to E is 2 and (1 + j) / (1 - g/2). Its
+real part is positive, so learning is stable with any step less than 1/4. It takes some ten cycles. (With g = 1, and v
+corrected by a as well, it is not stable: see the table.) The residual of an interval cut by k bits is weighted by
+2**-k: slow motion learns slowly.
 
-The bound without a further edge. With v at the anchor and no edge for s clocks, a constant deceleration that stops
-within the cell leaves at most 2 D/s - |v|, and a motion that turns within the cell returns no faster than v. The line
-is held within -v and bound - v, where bound = (5/2) D 2**-l and 2**l <= s < 2**(l+1): never tighter than for a cell a
-quarter too wide. While an edge is too close to the anchor, the bound is twice that, and there is none at first. An axis
-is at rest, v = a = 0, once the line is at twice the bound, where no parabola through the cell comes; and also after
-half the range of the stamp, since slower edges cannot be distinguished from rest. A stop from constant speed reads
-exactly 0 after 2.5 to 5 times the time of a count (plus two of the shortest intervals, if a count takes less); until
-then it reads the old speed.
+The bound without a further edge. Let v be the velocity at the anchor, and no edge come for s clocks. A constant
+deceleration that stops within the cell leaves at most 2 D/s - |v|. A motion that turns within the cell returns no
+faster than v. The line is held within -v and bound - v, where bound = (5/2) D 2**-l and 2**l <= s < 2**(l+1): never
+tighter than for a cell a quarter too wide. While an edge is too close to the anchor, the bound is twice that, and there
+is none at first. An axis is at rest, v = a = 0, once the line is at twice the bound: no parabola through the cell comes
+there. It is at rest too after half the range of the stamp, since slower edges cannot be distinguished from rest. A stop
+from constant speed reads exactly 0 after 2.5 to 5 times the time of a count; if a count takes less than the shortest
+interval, two of these come on top. Until then it reads the old speed.
 
-Bursts. Some encoders emit their edges several at once, after a silence that is no sign of a slower axis. `refuted`
-finds them by an edge at which the axis is faster than the last bound allows. For `bursts.doubt_samples` from then on
-the line is not held, and there is no rest by silence. A stop within that time reads the old speed until its end.
+Bursts. Some encoders emit several edges at once, after a silence that does not mean a slower axis. `refuted` finds them
+by an edge at which the axis is faster than the last bound allows. For `bursts.doubt_samples` from then on the line is
+not held, and there is no rest by silence. A stop within that time reads the old speed until its end.
 
 Guarantee. For any gains, any |f''| <= A and errors of the learnt places up to p counts, s clocks after a correction
-over T: |u - f'| <= (1 + 2 p) D / T + (A + |a|) (T/2 + s), with the larger of |a| before and after it; or, in a silence
-shorter than T, D / s + A s/2 where that is more. The first term is for |E| < D; on the surface, which is reached within
-a few edges in any motion that the gains allow, it is 2 p D / T. (For a near the true one the bound is far from tight,
-but no a within the format breaks it, so it holds beyond C, too.)
+over T: |u - f'| <= (1 + 2 p) D / T + (A + |a|) (T/2 + s). |a| is the larger of its values before and after the
+correction. In a silence shorter than T the bound is D / s + A s/2 where that is larger. The first term is for |E| < D.
+On the surface it is 2 p D / T; any motion that the gains allow reaches the surface within a few edges. (The bound is
+far from tight for an a near the true one. But it holds for every a within the format, so it holds beyond C, too.)
 
-Measured RMS error in mm/s. Paper: 50 exp(-t) sin(2 pi t) mm, t in [1, 5] s, 1 um, 1 MHz, gains for C = 12 m/s^2,
-50 MHz stamps; hit: 0.35 kg at 0.3 m/s on 10 kN/m and 20 N s/m (up to 68 m/s^2); late: the same with B late by
-0.25 count.
+Measured RMS error in mm/s. Paper: 50 exp(-t) sin(2 pi t) mm, t in [1, 5] s, 1 um, 1 MHz; gains for C = 12 m/s^2, 50 MHz
+stamps; hit: 0.35 kg at 0.3 m/s on 10 kN/m and 20 N s/m (up to 68 m/s^2); late: the same with B late by 0.25 count.
 
     design, float                                                 paper    late     hit     late
     levant on the count, u / u1                                   1.75 / 0.58       177 / 258
@@ -74,18 +74,18 @@ Measured RMS error in mm/s. Paper: 50 exp(-t) sin(2 pi t) mm, t in [1, 5] s, 1 u
     this one, float and fixed                                     0.0065   0.0063   0.060   0.059
       20 MHz stamps                                               0.013    0.013    0.095   0.43
 
-This estimator is worse than `levant` u1 at a constant speed of a metre a second (0.22 against 0.013: the stamp's error
-over the shortest interval), for vibration of about a count at hundreds of hertz (12 m/s^2 up to 1 kHz: 1.7 to 2.2
-against 1.2, peaks of 17), in the intervals after a stop from a millimetre a second or less, and on recorded counts,
-whose edges have no stamps: stamps interpolated between two samples are no better than the samples.
+This estimator is worse than `levant` u1 in four cases. At a constant speed of a metre a second, by the stamp's error
+over the shortest interval: 0.22 (`levant`: 0.013). For vibration of about a count at hundreds of hertz (12 m/s^2 up to
+1 kHz): 1.7 to 2.2 with peaks of 17 (`levant`: 1.2). In the intervals after a stop from a millimetre a second or less.
+And on recorded counts, whose edges have no stamps: stamps interpolated between two samples are no better than the
+samples.
 
 Source: Levant 1998 for the law; implicit discretisation of sliding modes after Acary and Brogliato; its use on
 stamped edges with learnt places is this project's.
 
 Saturation. v and u saturate at the velocity format (flag `velocity_saturated`); the distance saturates at its format
-and |E| / T at the velocity format (flag `error_saturated`), after which the next edges recover a motion within the
-format. Acceleration, places and the learning step saturate silently: as limits they are part of the law, in float64
-too.
+and |E| / T at the velocity format (flag `error_saturated`). The next edges then recover a motion within the format.
+Acceleration, places and the learning step saturate silently: as limits they are part of the law, in float64 too.
 
 Limits. The count and the stamp may wrap: differences are modulo their widths. The first sample, and a sample with
 `restart`, forget everything, the places included; u = 0 until the second edge in use after it, so a reset in motion
@@ -131,7 +131,7 @@ def _shifted(places, to, since, by, low, high):
 
 @compiled
 def within(line, velocity, bound):
-    """Return the extrapolated `line` held within the bound that the module gives for no further edge."""
+    """Return the extrapolated `line`, held within the module's bound for the time without a further edge."""
     if velocity < 0:
         return saturate(line, -max(bound + velocity, 0), -velocity)
     return saturate(line, -velocity, max(bound - velocity, 0))
@@ -139,7 +139,7 @@ def within(line, velocity, bound):
 
 @compiled
 def refuted(bound, before, after):
-    """Return whether a velocity at an edge shows that the bound before this edge was no bound: edges come in bursts.
+    """Return whether a velocity at an edge exceeds the last bound: edges come in bursts.
 
     Without bursts an axis that slows down within its cell is no faster at the next edge than `bound` less its speed
     `before`. One that stops in it and starts again is slower than half of that speed.

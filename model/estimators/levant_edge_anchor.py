@@ -1,9 +1,9 @@
-"""Edges in use of `levant_edge`: which of the edges that samples see correct its velocity, and which one is the anchor.
+"""The edges in use of `levant_edge`: the edges that correct its velocity, and the edge that becomes the anchor.
 
-A stamp is off by up to a clock, so the velocity over T is off by speed / T: intervals of less than 2**shortest clocks
-are not used. 2**shortest is the T at which, at the largest speed, that error equals the change of
-velocity by C over T: sqrt(speed / (clock C)); but at most a quarter of the time in which C moves a count, sqrt(q / C).
-An edge too close to the anchor stays unused: the next edge is taken with the interval from the anchor.
+A stamp is off by up to a clock, so the velocity over T is off by speed / T. Intervals shorter than 2**shortest clocks
+are not used. 2**shortest is the T at which, at the largest speed, this error equals the change of velocity by C over T:
+sqrt(speed / (clock C)). It is at most a quarter of the time in which C moves a count, sqrt(q / C). An edge too close to
+the anchor stays unused: the next edge is taken with the interval from the anchor.
 """
 
 from ..arithmetic.fixed import wrap

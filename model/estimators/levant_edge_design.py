@@ -1,15 +1,15 @@
 """Gains, formats, run-time words and state of `levant_edge`, derived from the axis; `levant_edge` defines the law.
 
-The symbols v, a, E, T, L, D and C are those of `levant_edge`; q is a count, u the velocity output.
+`levant_edge` defines the symbols v, a, E, T, L, D and C; q is a count, u the velocity output.
 
-- `velocity` SQ(i, f): i holds twice the largest speed; f resolves sqrt(C q), the speed that C gives within half a
+- `velocity` SQ(i, f): i holds twice the largest speed. f resolves sqrt(C q), the speed that C gives within half a
   count, to 2**-SPEED_BITS, and at least the slowest edges. `acceleration` has the same width, so that one multiplier
   suffices for both, and its i holds 2**ACCELERATION_BITS C. Both have at most WIDTH_MAX bits, and no more than let
   their product with a time fit int64.
-- `mantissa`: number of top bits of a time that multiply and divide. A T cut to these bits has a relative error of
-  2**(1 - mantissa), which changes the speed of one count in it, D/T, by no more than 4 LSB of velocity; times of at
-  least four samples and four shortest intervals are exact.
-- `error`, E over 2**k if k bits are cut: i holds |v| 2**mantissa and the place from which it is subtracted; f is less
+- `mantissa`: number of top bits of a time that multiply and divide. If T is cut to these bits, its relative error is
+  2**(1 - mantissa). This changes D/T, the speed of one count in it, by at most 4 LSB of velocity. Times of at least
+  four samples and four shortest intervals are exact.
+- `error`, E over 2**k if k bits are cut. i holds |v| 2**mantissa and the place from which it is subtracted. f is less
   than velocity's by the bits of the shortest interval less one: half an LSB of velocity after the division.
 - `place`: half a count, in steps of 2**-PLACE_BITS. `distance`: edges at twice the largest speed in two samples and two
   shortest intervals; a larger number saturates.
@@ -45,7 +45,7 @@ ACCELERATION_BITS = 3
 ROOT_BITS = 5
 """The root of the least error that it limits is resolved to 2**-ROOT_BITS."""
 LEARN_SHIFT = 5
-"""An edge's error moves the two places on which it depends by 2**-LEARN_SHIFT of that error."""
+"""An edge's error depends on two places, and moves each by 2**-LEARN_SHIFT of itself."""
 PLACE_BITS = 21
 """Places of edges resolve 2**-PLACE_BITS counts."""
 QUOTIENT_BITS = 2

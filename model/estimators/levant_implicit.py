@@ -1,7 +1,7 @@
 """Levant's differentiator by implicit Euler, for both the sign and the square root, in fixed point.
 
-The algorithm is `levant_semi_implicit`, but the root, too, is of the error after the step. Per sample, with f the
-count, x its tracked value, u1 the integral state, in counts and sample periods, and a plus for after the sample:
+The algorithm is `levant_semi_implicit`, but the root, too, is of the error after the step. Per sample, in counts and
+sample periods; f is the count, x its tracked value, u1 the integral state, and a plus means after the sample:
 
     e+  =  x + u1 - f  -  lambda sqrt(|e+|) sign(e+)  -  alpha S,      S in SGN(e+)
     u1+ =  u1 - alpha S
@@ -15,8 +15,8 @@ b, and z = sqrt(|e+|) is the positive root of z^2 + lambda z = |b| - alpha. Toge
     u1+ = u1 - sign(b) near,   u = u1+ - sign(b) g,    e+ = sign(b) (beyond - g)
 
 a continuous map of b, in which g never exceeds beyond. The outputs are u, the corrected velocity, and u1, the integral
-state. The statements of `levant_semi_implicit` on standstill, constant speed, low and high rates hold here too: in the
-band both outputs are exactly the finite difference; outside it g is smaller, so this estimator is the smoother of the
+state. The statements of `levant_semi_implicit` on standstill, constant speed, low and high rates hold here too. In the
+band both outputs are exactly the finite difference. Outside it g is smaller, so this estimator is the smoother of the
 two between 1 and 100 kHz. (Here e+ is not 0 in some cases where it is 0 there, so a constant count takes some samples
 more.)
 
@@ -29,12 +29,12 @@ Formats are as in `levant_semi_implicit`, except:
 - g = lambda root - lambda^2/2, root = sqrt(beyond + lambda^2/4): the same multiplier makes lambda^2, used twice, and
   lambda times the root. `radicand` has room for lambda^2/4 at the largest word. In the radicand, lambda^2/4 is rounded
   down to the LSB, a position of 2**-(2 root.f); in g, lambda^2/2 is rounded to f bits.
-- With the root's half LSB as in `levant`, the error of g is at most delta = lambda 2**-(root.f+1) + 2 * 2**-(f+1), and
-  the same u follows exactly from a beyond displaced by at most
-  eta = 2 sqrt(beyond + lambda^2/4) delta / lambda + (delta / lambda)^2 + 2**-(2 root.f).
-  At beyond = 1 count the slope is sqrt(4 + lambda^2): either part of delta is held to POSITION_BUDGET / 2 there, which
-  at low rates takes a root of more bits than in the explicit estimator. (If lambda is in the thousands, the radicand
-  would exceed int64: the root then has the remaining bits, and delta grows.) g is held within 0 to beyond.
+- With the root's half LSB as in `levant`, the error of g is at most delta = lambda 2**-(root.f+1) + 2 * 2**-(f+1). The
+  same u follows exactly from a displaced beyond. The displacement is at most eta = 2 sqrt(beyond + lambda^2/4) delta /
+  lambda + (delta / lambda)^2 + 2**-(2 root.f). At beyond = 1 count the slope is sqrt(4 + lambda^2): each part of delta
+  is held to POSITION_BUDGET / 2 there. At low rates this takes a root of more bits than in the explicit estimator. (If
+  lambda is in the thousands, the radicand would exceed int64: the root then has the remaining bits, and delta grows.) g
+  is held within 0 to beyond.
 """
 
 import math

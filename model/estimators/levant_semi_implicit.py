@@ -1,9 +1,9 @@
 """Levant's differentiator with an implicit sign and an explicit square root, in fixed point.
 
-The explicit `levant` evaluates sign(e) before it knows whether its step crosses e = 0; at low rates, where the step
-alpha is not small against a count, it crosses at every sample: numerical chatter. Here the sign is that of the error
-*after* the step, set-valued at 0, so a step that would cross stops there. Per sample, with f the count, x its tracked
-value, u1 the integral state, in counts and sample periods, and a plus for after the sample:
+The explicit `levant` evaluates sign(e) before it knows whether its step crosses e = 0. At low rates the step alpha is
+not small against a count, and it crosses at every sample: numerical chatter. Here the sign is taken of the error
+*after* the step. It is set-valued at 0, so a step that would cross 0 stops there. Per sample, in counts and sample
+periods; f is the count, x its tracked value, u1 the integral state, and a plus means after the sample:
 
     e+  =  x + u1 - f  -  g sign(e+)  -  alpha S,      S in SGN(e+): sign(e+), or anything in [-1, 1] where e+ = 0
     u1+ =  u1 - alpha S
@@ -23,14 +23,15 @@ is the quieter output.
 - *Standstill and constant speed.* In the band |b| <= alpha, e+ = 0 and u1+ = (f - last f) - (last e): from the second
   successive sample within the band, both outputs are exactly the finite difference, without memory or rounding. In the
   band, therefore, fixed point and real numbers agree word for word. A constant count leads into the band from any
-  state, at every rate, and there gives exactly 0: measured with C = 1.6785 m/s^2 from 30 mm/s after 32 ms, from 0.3 m/s
-  after 0.22 s (about 2 u / alpha; `levant` never).
+  state, at every rate, and there u is exactly 0. With C = 1.6785 m/s^2 it was measured after 32 ms from 30 mm/s, and
+  after 0.22 s from 0.3 m/s: about 2 u / alpha. `levant` never gets there.
 - *Low rates.* If alpha is a count or more, the estimator is the finite difference, limited in acceleration: 0.42 mm/s
   RMS on the paper's signal at 1 kHz, where the explicit estimator has 1.95. There the lack of chatter does not make it
   better than the finite difference; and a larger C only makes it more similar.
-- *High rates.* With alpha and lambda^2 much less than a count, every count is an excursion beyond both projections, and
-  the estimator equals the explicit one: the noise of the count remains (at 1 MHz 0.649 against 0.647). In between, at 5
-  to 100 kHz, u is worse by up to a fifth (0.740 against 0.626 at 10 kHz), u1 better or equal (0.280 against 0.290).
+- *High rates.* With alpha and lambda^2 much less than a count, every count is an excursion beyond both projections. The
+  estimator then equals the explicit one, and the noise of the count remains (at 1 MHz 0.649; explicit: 0.647). In
+  between, at 5 to 100 kHz, u is worse by up to a fifth (at 10 kHz 0.740; explicit: 0.626). u1 is better or equal
+  (0.280; explicit: 0.290).
 
 Source: the implicit sign of Acary, Brogliato, Orlov, IEEE Trans. Automatic Control 2012; semi-implicit differentiators,
 whose projectors split S differently, Michel, Ghanes, Plestan, Aoustin, Barbot, CDC 2021, and as compared by
@@ -43,10 +44,9 @@ Formats are as in `levant`, with beyond instead of |e|, except:
   `error_saturated`). To let the root step across the whole speed range, lambda sqrt(beyond) and beyond must both reach
   it: the range holds (2 speed / lambda)^2 + 2 speed.
 - b, alpha, u1 and e+ have the same fraction bits: the whole projection is exact, and only g is rounded. Its error is at
-  most delta = lambda 2**-(root.f+1) + 2**-(f+1), without a bias, and g never exceeds its limit, so that e+ keeps its
-  sign. As g grows with beyond, at the rate lambda / (2 sqrt(beyond)) or 1, the same u follows exactly from a beyond
-  that is
-  displaced by at most eta = 2 sqrt(beyond) delta / lambda + (delta / lambda)^2 (or delta, where that is more).
+  most delta = lambda 2**-(root.f+1) + 2**-(f+1), without a bias. g never exceeds its limit, so e+ keeps its sign. g
+  grows with beyond, at the rate lambda / (2 sqrt(beyond)) or 1. So the same u follows exactly from a displaced beyond.
+  The displacement is at most eta = 2 sqrt(beyond) delta / lambda + (delta / lambda)^2, or delta where this is larger.
 - u saturates at the output, u1 in the state (flag `velocity_saturated`); e+ depends on neither limit, so a saturated u
   does not drag x.
 """
@@ -67,13 +67,13 @@ STEPS = 10
 
 
 class Params(NamedTuple):
-    """Parameters of the integer kernel: those of `levant`, in a separate class that selects this kernel."""
+    """Parameters of the integer kernel: as of `levant`, in a separate class, which selects this kernel."""
 
     levant: levant.Params
 
 
 class FloatParams(NamedTuple):
-    """Parameters of the float64 kernel: those of `levant`, in a separate class that selects this kernel."""
+    """Parameters of the float64 kernel: as of `levant`, in a separate class, which selects this kernel."""
 
     levant: levant.FloatParams
 

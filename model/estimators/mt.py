@@ -5,18 +5,19 @@ With c clocks a sample, and for the last edge its number N on the scale and its 
     v = c (N - N') / (S - S')       N', S': the last edge that was known half a window to a whole one ago
     bound |v| <= 3 c / 2 A          the last edge was A ago, and the next is at most 1.5 counts from it
 
-The classical method counts the edges of a sample (M) and times them (T) from the last edge before it to the last edge
-in it, so that counts and time belong together and neither has a fraction. Here samples may be much shorter than the
-window: two edges are kept, and every half window, of `half` samples, the newer becomes the older and the last edge the
-newer. v is made anew in every sample, over half a window to a whole one; over longer if no edge came, as in the
-method. While the older edge is the last one, v is held within the bound. Before there are two edges v = 0.
+The classical method counts the edges of a sample (M). It times them (T) from the last edge before the sample to the
+last edge in it. So counts and time belong together and neither has a fraction. Here samples may be much shorter than
+the window. Two edges are kept: every half window, of `half` samples, the newer one becomes the older one and the last
+edge becomes the newer one. v is made anew in every sample, over half a window to a whole one. If no edge came it is
+over longer, as in the method. While the older edge is the last one, v is held within the bound. Before there are two
+edges v = 0.
 
-N is the number of the edge itself, `count + down`, not the count: after a turn the same edge has the same number, so v
-is the mean velocity between two instants at which the position is known, whatever the direction. It has the edges'
-errors in full, for any two edges may be of different kinds: what repeats every four edges, `period` is immune to.
+N is the number of the edge itself, `count + down`, not the count. After a turn the same edge has the same number. So v
+is the mean velocity between two instants of known position, whatever the direction. It has the edges' errors in full,
+because any two edges may be of different kinds: what repeats every four edges, `period` is immune to.
 
-Guarantee. With |f''| <= C counts/sample^2 and each edge displaced by at most p counts, v over W samples is off by at
-most C W / 2 from acceleration and 2 p / W from the edges. For W between `half` and twice that, the sum is at most
+Guarantee. Let |f''| <= C counts/sample^2, and each edge be displaced by at most p counts. Then v over W samples is off
+by at most C W / 2 from acceleration and 2 p / W from the edges. For W between `half` and twice that, the sum is at most
 C half + 2 p / half, least at half = sqrt(2 p / C): `window_s`, a whole window, is 2 sqrt(2 p q / C). p is the axis's
 `edge_error_max_counts`, q a count. A clock of error in a stamp adds v / W clocks, one part in thousands.
 

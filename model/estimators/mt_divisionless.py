@@ -5,17 +5,17 @@
 
 `hardwall.model.arithmetic.divisionless` has the arithmetic and derives its bounds.
 
-N and S are the counts and clocks between two edges a window apart and A is the age of the last edge, as in `mt`: so are
-window, formats, start, standstill, restart and saturation, and the kernels are `kept_edges`'s. The corrections end in
-the exact quotient, rounded half up, so the derived bound on the reciprocal's error, 2**-10 of it, is none on v, and
-each word is that of `mt`. The lesser of two quotients, each rounded, is the lesser quotient rounded.
+As in `mt`, N and S are the counts and clocks between two edges a window apart. A is the age of the last edge. Window,
+formats, start, standstill, restart and saturation are the same. The kernels are in `kept_edges`. The corrections end in
+the exact quotient, rounded half up. So the bound on the reciprocal's error, 2**-10 of it, adds no error to v, and each
+word equals the word of `mt`. The lesser of two quotients, each rounded, is the lesser quotient rounded.
 
 What multiplying is for is time: a divider makes a bit a clock, a product DIGIT bits. It takes a larger multiplier, and
 more logic than a divider, which is small if it makes a bit a clock.
 
-Sources: those of `mt`; that an M/T method can do without a divider, if the reciprocal of the time is corrected by
-multiplications, is the idea of Sensors 2018, 18(10), 3250 and Electronics 2019, 8(3), 361, of which only the abstracts
-were read: the arithmetic here is this project's, and no figure is theirs.
+Sources: as of `mt`. The idea is from Sensors 2018, 18(10), 3250 and Electronics 2019, 8(3), 361: an M/T method without
+a divider, in which multiplications correct the reciprocal of the time. Only their abstracts were read: the arithmetic
+here is this project's, and no figure is theirs.
 """
 
 from ..arithmetic.divisionless import latency as quotient_latency

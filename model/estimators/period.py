@@ -10,18 +10,18 @@ clocks a sample, velocities in counts a sample and times in clocks:
 
 A cycle is used only if all its edges went in one direction, as far as samples show: if a sample hides a turn and a turn
 back, v is the mean over it. All cycles within one sample are used (m > 1), so the mean is over a sample or a cycle,
-whichever is longer. The relative error of a gap is twice the encoder's error; gaps are used for at most four edges
-after a turn (RMS error for the paper's signal at 1 MHz, in mm/s: v = 0 until there is a cycle 0.120, half of the
-gap's speed 0.101, all edges since the turn 0.094, the gap 0.092). With only one edge in this direction v = 0.
+whichever is longer. The relative error of a gap is twice the encoder's error. Gaps are used for at most four edges
+after a turn. (RMS error for the paper's signal at 1 MHz, in mm/s: v = 0 until there is a cycle 0.120; half of the gap's
+speed 0.101; all edges since the turn 0.094; the gap 0.092.) With only one edge in this direction v = 0.
 
 Both bounds hold wherever the edges are: the first for errors up to a quarter of a count, the second for any error. At
-constant speed the second bound is reached just as the next edge is due; the first becomes the tighter one as the axis
-slows (without the first bound 0.097 instead of 0.092; the bound c / A, which holds only for an ideal encoder, gives
-0.086 there and 1.25 with a phase error of a quarter count).
+constant speed the second bound is reached just as the next edge is due. The first becomes the tighter one as the axis
+slows. (Without the first bound the error is 0.097 instead of 0.092. The bound c / A holds only for an ideal encoder: it
+gives 0.086 there and 1.25 with a phase error of a quarter count.)
 
-Accuracy: a stamp is late by less than a clock, so a cycle's v is off by less than v / D, that is v^2 / 4 c counts a
-sample; and v is the velocity of D / 2 ago, off by at most C D / 2 if |f''| <= C. The two errors are equal at
-v = (4 c C)^(1/3), the design speed.
+Accuracy: a stamp is late by less than a clock. So a cycle's v is off by less than v / D, that is v^2 / 4 c counts a
+sample. Also, v is the velocity D / 2 ago, off by at most C D / 2 if |f''| <= C. The two errors are equal at v = (4 c
+C)^(1/3), the design speed.
 
 Source: Brown, Schneider, Mulligan, IEEE Trans. Industrial Electronics 1992, fixed-position methods; Ohmae et al. 1982,
 the M/T method; the bound by the time since the last edge is classical.
@@ -29,12 +29,12 @@ the M/T method; the bound by the time since the last edge is classical.
 Formats, derived.
 
 - `velocity` SQ(i, f): i holds twice the largest speed. The rounding, half an LSB, is at most ERROR_SHARE of the slowest
-  speed that can be read, one cycle in the age limit, and so of every speed: f follows from clock and rate alone.
+  readable speed, one cycle in the age limit, and so of every speed. f follows from clock and rate alone.
 - The quotient is unsigned and has one bit more for rounding half up, so it is as wide as `velocity`.
 - Cycles: the decoder counts at most one edge a clock, so a sample has at most ceil(c / 4) cycles; more are limited.
 
-At standstill v = 0, exactly, once the last edge is AGE_LIMIT of the stamp's range ago, or earlier if the bound is less
-than half an LSB. If a cycle lasts longer than that, v is read from gaps; if a gap lasts longer, v = 0. Twice the
+At standstill v is exactly 0 once the last edge is AGE_LIMIT of the stamp's range ago. It is 0 earlier if the bound is
+less than half an LSB. If a cycle lasts longer than that, v is read from gaps; if a gap lasts longer, v = 0. Twice the
 largest speed fits the format; the largest step of position is a cycle's mean like any other.
 
 Bursts. An encoder that emits its edges several at once has no cycles to be timed: the flag `edges_in_bursts` says so,

@@ -11,20 +11,20 @@ The slow speed needs no multiplication, only one division of a constant by the l
 immune to misplaced edges, because it subtracts only stamps of the same kind; but after a turn it reads 0 until there is
 a cycle in the new direction.
 
-Errors, with |f''| <= C in counts and samples. A cycle's stamps are late by less than a clock, an error of v^2 / 4 c,
-and its speed is that of D / 2 and up to a gap ago, an error of 3 C / v. A window's counts are off by less than one, an
-error of 1 / w, and its speed is that of w / 2 to 3 w / 2 ago, an error of 3 C w / 2. So w = sqrt(2 / 3 C) is the best
-window, and counting is the better of the two above the speed at which v^2 / 4 c equals the window's error,
-1 / w + 3 C w / 2: the switching speed. It is also at most CYCLE_SPEED, since an axis that makes more than a cycle in a
-sample leaves no single cycle to be timed. The run-time word goes no higher than a cycle a sample.
+Errors, with |f''| <= C in counts and samples. A cycle's stamps are late by less than a clock: an error of v^2 / 4 c.
+Its speed is the speed D / 2 ago plus up to a gap: an error of 3 C / v. A window's counts are off by less than one: an
+error of 1 / w. Its speed is the speed w / 2 to 3 w / 2 ago: an error of 3 C w / 2. So w = sqrt(2 / 3 C) is the best
+window. Counting is the better of the two above the switching speed. There v^2 / 4 c equals the window's error, 1 / w +
+3 C w / 2. It is also at most CYCLE_SPEED, since an axis that makes more than a cycle in a sample leaves no single cycle
+to be timed. The run-time word goes no higher than a cycle a sample.
 
-Counting begins with a window of more than `switch` counts, and timing again with a window of fewer than `switch` - 1: a
-hysteresis of two counts, by which windows at constant speed do not differ (the floor of a length takes two values;
-with edges a quarter count out of place, three). At a switch v jumps by at most the sum of both errors.
+Counting begins with a window of more than `switch` counts, and timing again with a window of fewer than `switch` - 1.
+This is a hysteresis of two counts. At constant speed windows differ by less: the floor of a length takes two values, or
+three with edges a quarter count out of place. At a switch v jumps by at most the sum of both errors.
 
-`period` uses all cycles in a sample, so its stamps cost at most v / c where a window of one sample is off by 1: with
-the same stamps `period` is better than counting at all speeds (v <= c), unless the window is longer than its mean over
-a sample or a cycle. This estimator is the published scheme for comparison.
+`period` uses all cycles in a sample, so its stamps add an error of at most v / c; a window of one sample is off by 1.
+With the same stamps `period` is better than counting at all speeds (v <= c). Only a window longer than the mean of
+`period`, over a sample or a cycle, changes this. This estimator is the published scheme for comparison.
 
 Source: Brown, Schneider, Mulligan, IEEE Trans. Industrial Electronics 1992: fixed time, fixed position, switching.
 

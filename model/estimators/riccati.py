@@ -5,15 +5,15 @@ import math
 import numpy as np
 
 INDEX_MAX = 64.0
-"""From this bandwidth a sample on, the gains are those of an infinite one."""
+"""From this bandwidth a sample on, the gains are the limits for an infinite bandwidth."""
 
 
 def steady_state(index: float, integrators: int = 3) -> tuple[float, float, float]:
     """Return K_x, K_v and K_a for a bandwidth of `index` a sample; K_a = 0 for two integrators.
 
-    The discrete Riccati equation of the filter, with white noise of density 1 as the last state's derivative and time
-    in units of the bandwidth, is solved by structure-preserving doubling: every iteration squares the number of samples
-    seen, and no cancellation occurs however small the index is.
+    The discrete Riccati equation of the filter is solved by structure-preserving doubling. The noise is white with
+    density 1, as the last state's derivative; time is in units of the bandwidth. Every iteration squares the number of
+    samples seen. No cancellation occurs, however small the index is.
     """
     h = min(index, INDEX_MAX)
     n = integrators

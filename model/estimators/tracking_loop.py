@@ -6,28 +6,28 @@ Position and velocity, x and v, in counts and sample periods; per sample, with f
     e  = f - x                           position error
     x <- x + 2 h e,  v <- v + h^2 e      h = 2 pi bandwidth / sample rate
 
-The output `u` is v. In seconds the gains are kp = 2 w and ki = w^2, with w = 2 pi bandwidth: for motion that is slow
-beside a sample, the poles are a double one at w, critically damped. x is held as its distance from the last count,
-`lead` = x - f, so that the count may wrap. One word, the bandwidth, sets both gains: the second is made by multiplying
-twice, so that no word breaks their relation.
+The output `u` is v. In seconds the gains are kp = 2 w and ki = w^2, with w = 2 pi bandwidth. For motion that is slow
+against a sample, this is a critically damped double pole at w. x is held as its distance from the last count, `lead` =
+x - f, so that the count may wrap. One word, the bandwidth, sets both gains: the second is made by multiplying twice, so
+that no word breaks their relation.
 
-Sources. The loop of encoder-driven servo drives, whose published firmware has these gains. ODrive: kp = 2 bandwidth
-and ki = kp^2 / 4 with the bandwidth in rad/s, 1000 by default, refused unless kp is less than the sampling rate.
-moteus: kp = 2 w, ki = w^2 with w = 2 pi pll_filter_hz / 2.48, 400 Hz by default, for it names the frequency at which
-the *position* has fallen by 3 dB, 2.48 w for a double pole; in its first releases w = 2 pi pll_filter_hz, as here. Both
-defaults are 160 Hz here. ODrive also takes its own position without its fraction of a count before it compares, and
-holds velocities below half a step of the loop at 0; neither is done here, where rest is exactly 0 without.
+Sources. The loop of encoder-driven servo drives, whose published firmware has these gains. ODrive: kp = 2 bandwidth and
+ki = kp^2 / 4, with the bandwidth in rad/s, 1000 by default; kp must be less than the sampling rate. moteus: kp = 2 w,
+ki = w^2 with w = 2 pi pll_filter_hz / 2.48, 400 Hz by default. pll_filter_hz is the frequency at which the *position*
+has fallen by 3 dB, 2.48 w for a double pole. In the first releases of moteus, w = 2 pi pll_filter_hz, as here. Both
+defaults are 160 Hz here. ODrive also drops the fraction of a count of its own position before it compares. It holds
+velocities below half a step of the loop at 0. Neither is done here: rest is exactly 0 without them.
 
-Beside `kalman`. The steady-state Kalman filter of two integrators has this form too, but gains of sqrt(2) h and h^2,
-a damping of 0.71; the estimator of that name has a third state, the acceleration, and gains from a model of the noise.
-This loop has no acceleration: at constant acceleration a its velocity is late by 2 / w, by 2 a / w, whatever the rate.
+Beside `kalman`. The steady-state Kalman filter of two integrators has this form too, but gains of sqrt(2) h and h^2, a
+damping of 0.71. The estimator `kalman` has a third state, the acceleration, and gains from a model of the noise. This
+loop has no acceleration: at constant acceleration a its velocity is late by 2 / w, by 2 a / w, whatever the rate.
 
-Stability. The poles are those of z^2 - (2 - 2 h - h^2) z + 1 - 2 h. Its discriminant is h^3 (h + 4), its value at 1 is
-h^2: for every 0 < h <= 1/2 both poles are real, none is negative, both are below 1, and neither state oscillates. The
-words end below 1/2, ODrive's limit, and begin at `least`, so *every word is a stable loop*; 0 would hold the velocity.
-(From 1/2 on a pole is negative, and at 2 sqrt(2) - 2 = 0.83 it is -1.) As the poles are real, the response of v to the
-difference of counts is nowhere negative, and its sum is 1: v is never beyond the largest difference, and does not
-overshoot.
+Stability. The poles are the roots of z^2 - (2 - 2 h - h^2) z + 1 - 2 h. Its discriminant is h^3 (h + 4), its value at 1
+is h^2: for every 0 < h <= 1/2 both poles are real, none is negative, both are below 1, and neither state oscillates.
+The words end below 1/2, ODrive's limit, and begin at `least`, so *every word is a stable loop*; 0 would hold the
+velocity. (From 1/2 on a pole is negative, and at 2 sqrt(2) - 2 = 0.83 it is -1.) As the poles are real, the response of
+v to the difference of counts is nowhere negative, and its sum is 1: v is never beyond the largest difference, and does
+not overshoot.
 
 Norms, the sums of absolute impulse responses, follow in the same way, for any h up to 1/2:
 
@@ -39,19 +39,20 @@ Formats, derived. C' = C tau^2 / q is the bound on the acceleration in counts a 
 - The difference of counts is held within `step_max`: the counts that twice the largest speed moves in a sample, begun
   within a count, and one count for an edge out of place. A larger one saturates (flag `velocity_saturated`): the excess
   is a displacement of the scale, without later effect.
-- The host may lower the bandwidth to the designed one / 2**RANGE_BITS, and raise it to at least 2**HEADROOM_BITS times
-  that, or to the end of the words: `least` and `most` are these h. The ranges of v and lead are the norms at `least`
-  times `step_max`, plus one: within that range of bandwidths nothing else saturates, and no word beyond it is accepted.
-  After a change of the bandwidth in motion lead may (flag `innovation_saturated`; it drags x along), and v (flag
-  `state_saturated`).
+- The host may lower the bandwidth to the designed one / 2**RANGE_BITS. It may raise it to at least 2**HEADROOM_BITS
+  times the designed one, or to the end of the words: `least` and `most` are these h. The ranges of v and lead are the
+  norms at `least` times `step_max`, plus one. Within that range of bandwidths nothing else saturates, and no other word
+  is accepted. After a change of the bandwidth in motion lead may (flag `innovation_saturated`; it drags x along), and v
+  (flag `state_saturated`).
 - f, fraction bits of the velocity: an LSB is at most sqrt(C') 2**-RESOLUTION_BITS. lead has GUARD_BITS more, and v
   another `reach`, 1 / `least` as a power of two, at least 2.
-- The multiplier takes lead without its last `less` bits, with most 2**less < 1, and then h e, which has the fraction
-  bits of lead and for the same reason no more bits than the first operand.
-- v without its additional bits, the operand and both products are floored. They add an error to the difference of
-  counts (up to 1 LSB of lead: 1 at v), to e (2**less: less than 1 at v), to h e (1, which is 1/h of e: 1 at v) and to v
-  (2**-reach: 2 at v). ERROR_NORM 2**-GUARD_BITS is less than half an LSB of the velocity: *at constant n counts a
-  sample the velocity, rounded half up, settles to n exactly*, to 0 at standstill, with any bandwidth of the range.
+- The multiplier takes lead without its last `less` bits, with most 2**less < 1. Then it takes h e, which has the
+  fraction bits of lead and so no more bits than the first operand.
+- v without its additional bits, the operand and both products are floored. They add four errors, in LSB at v: of the
+  difference of counts (up to 1 LSB of lead: 1 at v), of e (2**less: less than 1 at v), of h e (1, that is 1/h of e: 1
+  at v) and of v (2**-reach: 2 at v). ERROR_NORM 2**-GUARD_BITS is less than half an LSB of the velocity: *at constant n
+  counts a sample the velocity, rounded half up, settles to n exactly*, to 0 at standstill, with any bandwidth of the
+  range.
 - int64 holds 62 bits: if the formats do not fit, f is reduced; a bandwidth with which none is left is refused.
 
 Restart and the first sample: all states 0. A start from rest has no transient; a start in motion has the step response
@@ -149,7 +150,7 @@ class Design(EstimatorDesign):
         step_max: largest difference of counts.
         least, most: the range of h within which only the difference of counts saturates.
         velocity, lead, v, operand: formats of the output, of the two states, and of what the multiplier takes.
-        shifts: right shifts of the first product to the LSB of lead, and of the second to that of v.
+        shifts: right shifts of the first product to the LSB of lead, and of the second to the LSB of v.
         bandwidth_min_hz, bandwidth_max_hz: range of bandwidths that a design may have.
         words: `tracking_loop_bandwidth`, in Hz.
 

@@ -13,8 +13,8 @@ it: a constant half count, which adds no velocity, and eps = 1/2 count in either
 h counts has eps = (1 + h) / 2, where h is the largest difference of two displacements.
 
 Past counts come from `history`, which defines the behaviour during the first n samples, at a wrap of the count, and
-beyond the largest speed. If it stores only every M-th position, n is a multiple of M and v is held between: that adds
-at most c (M - 1) to the error, a fraction 1 / (n / M) of it or less, and n / M is a thousand or more.
+beyond the largest speed. If it stores only every M-th position, n is a multiple of M and v is held between. This adds
+at most c (M - 1) to the error: a fraction 1 / (n / M) of it or less, and n / M is a thousand or more.
 
 Formats, derived:
 
@@ -22,9 +22,9 @@ Formats, derived:
   by n (`divide`), so this word alone changes the window: no reciprocal has to change with it.
 - `velocity` SQ(i, f): i as in `history.change`, whose range no average of changes can exceed, so v cannot overflow.
 - f: v is rounded toward zero, an error of less than an LSB, in RMS 0.58 LSB. Quantisation alone gives v an RMS error of
-  0.41 / n (two independent errors of a uniform count). An LSB of 2**-ROUNDING_BITS / n_max, with n_max the longest
-  window that the word can set, keeps rounding below 0.6 % of that for every n. A count of motion over the window is
-  never less than 2**ROUNDING_BITS LSB, so there is no dead zone; standing for n samples gives exactly 0.
+  0.41 / n (two independent errors of a uniform count). n_max is the longest window that the word can set. An LSB of
+  2**-ROUNDING_BITS / n_max keeps rounding below 0.6 % of that for every n. A count of motion over the window is never
+  less than 2**ROUNDING_BITS LSB, so there is no dead zone; standing for n samples gives exactly 0.
 
 Limits. v never leaves its format. A step reads as its counts / n for n samples, then 0; of a step beyond twice the
 largest speed, only the part up to that is read. After the first sample or a restart in motion v is too small for n

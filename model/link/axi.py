@@ -5,8 +5,8 @@ is one word. Of pulses and counters, which have one register each, a word has tw
 one of them.
 
 A write is a frame of its own: it is checked, done, and answered when the axis has it. A read of a status takes a
-snapshot, unless it is of the word behind the one that was read last: so words that are read in the order of their
-addresses are of one snapshot.
+snapshot, unless its word follows the word read last. So words that are read in the order of their addresses are of one
+snapshot.
 """
 
 from enum import IntEnum

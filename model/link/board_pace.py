@@ -1,7 +1,7 @@
 """The pace of a virtual board, which it tells its hosts beside the line: nothing in the board knows of it.
 
-Both ends meet at an abstract socket of this machine, whose name has the port in it. It is there as long as the process
-of the virtual board is, so that no board is taken for one that has gone; and a port without it has the pace 1.
+Both ends meet at an abstract socket of this machine, whose name has the port in it. The socket exists as long as the
+process of the virtual board, so no old socket tells a pace. A port without it has the pace 1.
 """
 
 import os
@@ -16,7 +16,7 @@ NETWORK = "tcp://"
 PACE_LEAST = 1e-3
 """The slowest board, in its seconds in a second."""
 MARGIN = 3.0
-"""By how much its hosts are told less than its pace, for a machine is not always as fast."""
+"""The margin by which hosts are told less than its pace, because a machine is not always equally fast."""
 CHANGE = 0.1
 """The part by which a pace is another one."""
 FIRST_S = 5.0
@@ -74,7 +74,7 @@ class Teller:
         self.close()
 
     def close(self) -> None:
-        """Leave all hosts, which keep to what they were told last."""
+        """Leave all hosts; they keep the last pace that they were told."""
         for each in (*self._listeners, *self._hosts):
             each.close()
 
@@ -133,8 +133,8 @@ class Told:
     def __init__(self, port: str):
         self._pace, self._lock = 1.0, threading.Lock()
         self._line: socket.socket | None = None
-        # Without a virtual board there is nobody to be heard, and no such socket but on Linux; a board that stands will
-        # not answer anything else either.
+        # Without a virtual board no pace is told, and only Linux has such sockets. A stopped board does not answer
+        # other requests either.
         with suppress(OSError, ValueError, AttributeError):
             self._line = _socket()
             self._line.settimeout(FIRST_S)

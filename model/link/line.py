@@ -1,13 +1,14 @@
 """The serial-line layer of Modbus RTU: where a frame ends, whether its CRC is good, and to whom it is addressed.
 
-A frame is a unit, a function, data and a CRC, at most `FRAME_MAX` bytes. It ends by its length, which function and
-data give, because pauses mean nothing behind a USB adapter; a function that is not known ends by a gap of `GAP_S`,
-longer than the pauses of USB. What is spoilt on the way is dropped in silence, up to the next gap, and counted.
+A frame is a unit, a function, data and a CRC, at most `FRAME_MAX` bytes. Its end follows from its length, which
+function and data give: pauses mean nothing behind a USB adapter. A frame with an unknown function ends at a gap of
+`GAP_S`, longer than the pauses of USB. What is spoilt on the way is dropped in silence, up to the next gap, and
+counted.
 
-No single bit that is flipped on the way lets a frame through. The CRC finds every flip in a frame that is taken to have
-the length that it was sent with. A flip changes that length only by way of the function or of a byte count. No
-function with a length differs by one bit from a function with another length, so that a flipped function either keeps
-its length or ends by a gap. And a byte count that does not agree with its number of registers is refused by the server.
+No single bit that is flipped on the way lets a frame through. The CRC finds every flipped bit, as long as the frame is
+taken with its true length. A flip changes that length only by way of the function or of a byte count. No function with
+a length differs by one bit from a function with another length. So a flipped function either keeps its length or ends
+by a gap. And a byte count that does not agree with its number of registers is refused by the server.
 """
 
 from enum import IntEnum
@@ -25,7 +26,7 @@ COUNTED = {16: 6, 23: 10}
 
 
 class Verdict(IntEnum):
-    """What a frame was."""
+    """The verdict on a frame."""
 
     SPOILT = 0  # the CRC is bad, a stop bit was low, it is too long, or it ended too early
     OVERRUN = 1  # bytes came while an answer was under way
@@ -63,7 +64,7 @@ class Line:
     """The line's receiving end, byte by byte.
 
     Attributes:
-        frame: the bytes of the frame under way; after a verdict, those of the frame judged.
+        frame: the bytes of the frame under way, or of the frame judged after a verdict.
         draining: everything is dropped until a gap.
     """
 
@@ -105,6 +106,6 @@ class Line:
         return self._judged(not known and len(self.frame) >= FRAME_MIN)
 
     def overrun(self) -> Verdict:
-        """Take it that bytes came while an answer was under way; return the verdict, which comes after the answer."""
+        """Note that bytes came while an answer was under way; return the verdict, which comes after the answer."""
         self.draining = True
         return Verdict.OVERRUN

@@ -24,7 +24,7 @@ DEVICE_IDENTIFICATION = 14
 ECHO, CLEAR, FIRST_COUNTER, LAST_COUNTER = 0x00, 0x0A, 0x0B, 0x12
 """Sub-functions of diagnostics; the counter of one is at its three lowest bits."""
 NAMED = 4
-"""The kind of identification that asks for one object; those below it ask for a stream."""
+"""The kind of identification that asks for one object; lower kinds ask for a stream."""
 FUNCTION, ABSENT, VALUE, FAILURE = 1, 2, 3, 4
 """The exceptions."""
 OVERRUNS, MESSAGES, ERRORS, EXCEPTIONS, REQUESTS, UNANSWERED = 2, 3, 4, 5, 6, 7

@@ -8,10 +8,10 @@ a whole number of clocks, and one more whenever the parts that are left over hav
 at most half a part in a bit, that is by about 1 / (2**(FRACTION_BITS + 1) n) of itself: 0.2 % at 4 clocks a bit. No
 edge is more than a clock late, and lateness does not add up.
 
-Receiver. The clock that first sees the start bit is up to 1 clock late, and so is the one at which a bit is sampled;
-the count starts a clock early, so every sample is taken within 1 clock of the middle of its bit as the receiver's rate
-has it. The middle of the stop bit is 9.5 bits behind the edge. It is still inside the stop bit,
-and the last data bit too, if the two ends' rates differ by a fraction e with
+Receiver. The clock that first sees the start bit is up to 1 clock late, and so is the clock at which a bit is sampled.
+The count starts a clock early. So every sample is taken within 1 clock of the middle of its bit, by the receiver's
+rate. The middle of the stop bit is 9.5 bits behind the edge. It is still inside the stop bit, and the last data bit
+too, if the two ends' rates differ by a fraction e with
 
     9.5 e n + 1 < n / 2         so e < (1/2 - 1/n) / 9.5: 2.6 % at 4 clocks a bit, 4.7 % at 20
 
@@ -26,7 +26,7 @@ from ..checks import FieldError, check_int
 FRACTION_BITS = 6
 """Bits of the part of a clock in the length of a bit."""
 BAUD_MIN, BAUD_MAX = 115_200, 3_000_000
-"""The rates that USB serial adapters have in common and that are quick enough for a haptic host."""
+"""Baud rates that USB serial adapters have in common, fast enough for a haptic host."""
 BAUD = 921_600
 """The rate where none is chosen."""
 CLOCKS_PER_BIT_MIN = 4
@@ -94,7 +94,7 @@ class Design:
         return self.after(LAST_PART)
 
     def after(self, parts: int) -> tuple[int, int]:
-        """Return the clocks to count, less one, and the parts that are left over, of a bit that begins with `parts`."""
+        """Return the clocks to count, less one, and the remaining parts, for a bit that begins with `parts`."""
         total = self.period + parts
         return (total >> FRACTION_BITS) - 1, total & LAST_PART
 

@@ -1,4 +1,4 @@
-"""What an annotated type accepts, in words: of a key of a scene, and of an option of the command line."""
+"""The accepted values of an annotated type, in words: for a key of a scene, and for an option of the command line."""
 
 import types
 import typing
@@ -6,7 +6,7 @@ from typing import Any
 
 
 def accepted(kind: Any, marks: tuple = ()) -> str:
-    """Return what a key of a type accepts, with the limits that are annotated."""
+    """Return the accepted values of a type in words, with its annotated limits."""
     origin, inner = typing.get_origin(kind), typing.get_args(kind)
     if origin is typing.Annotated:
         return accepted(inner[0], kind.__metadata__ + tuple(marks))

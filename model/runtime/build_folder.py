@@ -1,7 +1,6 @@
 """The folder of what the program makes for itself: compiled kernels, built hardware, stored results.
 
-All of it can be made again. What is found there is checked before it is used, and a run does without what cannot be
-written there.
+All of it can be made again. Its content is checked before use. A run does without files that cannot be written there.
 """
 
 import atexit
@@ -38,7 +37,9 @@ def build_dir() -> Path:
         try:
             return Path(chosen).expanduser().absolute()
         except RuntimeError:
-            raise BuildFolderError(f"HARDWALL_BUILD must not begin with a home that nobody has: {chosen!r}") from None
+            raise BuildFolderError(
+                f"HARDWALL_BUILD must not begin with the home of an unknown user: {chosen!r}"
+            ) from None
     root = Path(__file__).absolute().parents[2]
     if (root / "pyproject.toml").exists():
         return root / "build"
@@ -81,12 +82,12 @@ def _temporary() -> Path:
 
 
 def folder_of_tools() -> Path:
-    """Return where tools may write: the build folder, or where that cannot be, a folder that is removed at the end."""
+    """Return the folder in which tools may write: the build folder, or else one that is removed at the end."""
     return build_dir() if _takes_files(build_dir()) else _temporary()
 
 
 def home_for_tools() -> dict[str, str]:
-    """Return the variables that say where a tool keeps what it compiles: below the user's home if it takes files.
+    """Return the environment variables for a tool's cache folder: below the user's home if that can be written.
 
     Yosys, the placers and ccache do not start without such a home, or with a relative path. The home itself is not
     made: a folder that is not there may be meant to stay so.

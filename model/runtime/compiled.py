@@ -1,8 +1,8 @@
 """How kernels are compiled: one plain Python source for a single step, a long record, many lanes and the closed loop.
 
-`compiled` is `numba.njit` with a disk cache that follows the *content* of the whole project, so that no edit of a
-callee in another file leaves the old arithmetic in place: see `kernel_cache`. The cache leans on the inside of Numba:
-with a version that it was not tested with, kernels are compiled by every process, and one line says so. With
+`compiled` is `numba.njit` with a disk cache that follows the *content* of the whole project. So an edit of a callee in
+another file never leaves the old arithmetic in place: see `kernel_cache`. The cache leans on the inside of Numba: with
+a version that it was not tested with, kernels are compiled by every process, and one line says so. With
 `NUMBA_DISABLE_JIT=1` the same functions run as ordinary Python.
 
 `by_type` is the one place where a kernel picks its variant: a function with several bodies, chosen by the type of its
@@ -65,8 +65,8 @@ def _kernel(function: Kernel, into_caller: bool) -> Kernel:
     """Return `function` as Python calls it, and as compiled code does.
 
     The wrapper that converts Python objects is a third of the compiler's work, and a call from compiled code does not
-    need it: a second compilation, without the wrapper, serves such calls. Whether that one is inlined is always stated,
-    because Numba otherwise takes it from the caller that happens to be compiled first.
+    need it: a second compilation, without the wrapper, serves such calls. Its inlining is always stated: otherwise
+    Numba takes it from whichever caller is compiled first.
     """
     kernel = _jit(function, "called", forceinline=False)
     if not cast(Any, config).DISABLE_JIT:

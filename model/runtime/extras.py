@@ -1,7 +1,7 @@
-"""The packages that this project needs: which extra installs each, and which versions it may have.
+"""The packages that this project needs: the extra that installs each, and the range of its versions.
 
-Names and ranges are those of the project's metadata, from `pyproject.toml`. A room calls `need` where it is first
-imported, so that a package that is absent, or of another version, is one line instead of a fault somewhere inside.
+Names and ranges come from the project's metadata, from `pyproject.toml`. A room calls `need` where it is first
+imported. So a package that is absent, or of another version, gives one line instead of a fault somewhere inside.
 Without metadata, which a copied folder does not have, nothing is checked.
 """
 
@@ -22,7 +22,7 @@ HOLDS = {
 
 
 class RequirementError(ImportError):
-    """A package is absent, or its version is outside the range: one line that says what is needed."""
+    """A package is absent, or its version is outside the range: one line with the needed range."""
 
 
 def version_of_project() -> str | None:
@@ -46,7 +46,7 @@ def absent(package: str, extra: str | None) -> str:
 
 
 def lacking(error: ImportError) -> str | None:
-    """Return the message for an import that failed; None unless it failed for a package that an extra installs."""
+    """Return the message for a failed import; None unless an extra installs the missing package."""
     if isinstance(error, RequirementError):
         return str(error)
     top = (error.name or "").partition(".")[0]
@@ -57,7 +57,7 @@ def lacking(error: ImportError) -> str | None:
 
 @cache
 def need(extra: str | None, *packages: str) -> None:
-    """Check that packages are installed, in versions that the project works with.
+    """Check that packages are installed in the versions of the project's ranges.
 
     Args:
         extra: the extra that installs them; None for the packages that the project always needs.

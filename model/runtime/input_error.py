@@ -2,4 +2,4 @@
 
 
 class InputError(ValueError):
-    """Invalid input: one line that says what is wrong with it, and what is accepted."""
+    """Invalid input. The message is one line: the fault, and the accepted values."""

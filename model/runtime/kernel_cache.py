@@ -1,9 +1,9 @@
 """Compiled kernels on disk, found by what they compute and checked before they run.
 
-Numba's own cache looks at the file of the function alone, not at those of its callees, and runs whatever bytes it
-finds. Here a folder has the name of the digest of all sources (see `provenance`), a file of machine code has the name
-of its own digest, and the index of these files begins with its own. What is absent, damaged or of another form is
-compiled afresh. A folder that cannot be written is done without, and one line says so.
+Numba's own cache looks only at the file of the function, not at its callees' files, and runs any bytes it finds. Here a
+folder is named after the digest of all sources (see `provenance`). A file of machine code is named after its own
+digest, and the index of these files begins with its own digest. What is absent, damaged or of another form is compiled
+afresh. A folder that cannot be written is done without, and one line says so.
 """
 
 import hashlib
@@ -37,7 +37,7 @@ class KernelCache(_Cache):  # type: ignore[misc]
     def __init__(self, function: Callable, options: str):
         provenance.note(function.__module__)
         self._function, self._options = function, options
-        # A function that was made from a text has no source that a digest could follow.
+        # A function made from a text has no source for a digest to follow.
         self._enabled = provenance.is_in_its_file(function)
         name = re.sub(r"[^\w.-]", "", f"{function.__module__}.{function.__qualname__}")
         self._name = f"{name}-{function.__code__.co_firstlineno}"
@@ -91,7 +91,7 @@ class KernelCache(_Cache):  # type: ignore[misc]
 class _Shelf:
     """Pickled objects by their keys: an index, and a file for each object, which has the name of its digest.
 
-    Two processes that put at once may lose an entry of the index, but never get one that is not theirs.
+    Two processes that write at once may lose an entry of the index, but never get a wrong one.
     """
 
     def __init__(self, folder: Path, name: str):
@@ -135,7 +135,7 @@ def _name(data: bytes) -> str:
 
 
 def _loaded(data: bytes) -> Any | None:
-    """Return what was pickled; None if its classes are not what they were."""
+    """Return the unpickled object; None if its classes have changed."""
     try:
         return pickle.loads(data)
     except (AttributeError, ImportError, TypeError, ValueError, pickle.UnpicklingError):

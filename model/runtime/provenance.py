@@ -1,11 +1,11 @@
-"""The sources that compiled code comes from: a digest of them is the key under which it is kept.
+"""The sources of compiled code: their digest is the key under which the code is kept.
 
-Compiled code contains every kernel that it calls and every constant that these use, from whatever file. So the key of
-the project's own kernels is the content of all its sources. Where code from elsewhere takes part, a force law in a
-user's own module perhaps, the key contains that module too, and all that it imports.
+Compiled code contains every kernel that it calls and all their constants, from any file. So the key of the project's
+own kernels is the content of all its sources. If code from elsewhere takes part, for instance a force law in a user's
+own module, the key includes that module and all its imports.
 
 A source counts as it was when its kernels were defined. If a file of the project is edited while a process still
-imports it, no key describes what that process runs, and it neither keeps nor uses kept code.
+imports it, no key describes the running code. That process then neither stores nor uses kept code.
 """
 
 import ast
@@ -78,7 +78,7 @@ def project_key() -> str:
 
 @functools.cache
 def imported(content: bytes, package: str) -> tuple[str, ...]:
-    """Return the names of all modules that a source imports, of their packages, and of what it takes from them."""
+    """Return the names of all modules that a source imports, of their packages, and of the names imported from them."""
     found = []
     for node in ast.walk(ast.parse(content)):
         if isinstance(node, ast.Import):
@@ -103,7 +103,7 @@ def is_in_its_file(function: Callable) -> bool:
 
 
 def _outside(name: str) -> dict[Path, bytes]:
-    """Return the digest of a module's source, and of those outside the project that it imports, directly or not.
+    """Return the digest of a module's source and of the sources outside the project that it imports, directly or not.
 
     Of an installed package, other than the module's own, its version stands for its content.
     """
@@ -137,13 +137,13 @@ def note(name: str) -> None:
 
 
 def chooses(kind: type, kernel: Callable) -> None:
-    """Take note that a class chooses a kernel, which is then part of what is compiled for that class."""
+    """Register that a class chooses a kernel: the kernel is then part of the code compiled for that class."""
     function = getattr(kernel, "py_func", kernel)
     _chosen.setdefault(kind, set()).add(function.__module__ if is_in_its_file(function) else NOWHERE)
 
 
 def _modules(kind: Any) -> Iterator[str]:
-    """Yield the module of every class that a type of Numba consists of, and of every kernel that these choose."""
+    """Yield the module of every class within a type of Numba, and of every kernel that these classes choose."""
     if isinstance(kind, types.Dispatcher):
         yield kind.dispatcher.py_func.__module__
     elif isinstance(kind, types.Type):

@@ -24,13 +24,14 @@ if HANGUP is not None:
 GRACE_S = 1.0
 """The time for what is printed to go out."""
 UNDO_S = 10.0
-"""The time for what is undone: one that waits, perhaps for a lock of the thread that was interrupted, is left."""
+"""The time allowed for an undo step. A step that waits longer, perhaps for a lock of the interrupted thread, is given
+up."""
 TO_THE_START_OF_THE_LINE, SHOW_THE_CURSOR = "\r\x1b[K", "\x1b[?25h"
 
 
 @dataclass
 class _Kept:
-    """The results that outlive this process, the way to go on from them, and what else there is to say of the run."""
+    """The results that outlive this process, the way to continue from them, and a remark on the run."""
 
     results: int = 0
     way: str = "the same command goes on from there"
@@ -75,12 +76,12 @@ def go_on_by(way: str) -> None:
 
 
 def said_by(say: Callable[[], str]) -> None:
-    """Let a function say what there is of a run that is ended: the end of `remark` if no results are counted."""
+    """Set a function that describes an ended run: it gives the end of `remark` if no results are counted."""
     _kept.said = say
 
 
 def remark() -> str:
-    """Return the end of a message that says what is kept of an unfinished run, and how to go on; often empty."""
+    """Return the end of a message on an unfinished run: the kept results and the way to continue; often empty."""
     if not _kept.results and _kept.said:
         return f"; {_kept.said()}"
     if not _kept.results:
@@ -126,7 +127,7 @@ def _within(seconds: float, do: Callable[[], object]) -> None:
             do()
         over.release()
 
-    # To start a `threading.Thread` takes locks, which the thread that was interrupted may have.
+    # Starting a `threading.Thread` takes locks, which the interrupted thread may hold.
     _thread.start_new_thread(run, ())
     over.acquire(timeout=seconds)
 

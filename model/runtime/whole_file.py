@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 unfinished: set[Path] = set()
-"""The temporary files that are being written, for a process that ends in the middle of its work to remove."""
+"""The temporary files under way; a process that is ended in the middle of its work removes them."""
 
 
 class NotWrittenError(OSError):
@@ -18,7 +18,7 @@ class NotWrittenError(OSError):
 def whole_file(path: str | Path) -> Iterator[Path]:
     """Provide a temporary file beside `path` to write to; rename it to `path` once it is complete.
 
-    A `path` that is a symbolic link stays one: the file that it leads to is written.
+    If `path` is a symbolic link it stays one: its target is written.
 
     Raises:
         NotWrittenError: if the file cannot be written, or something cannot while it is open.
@@ -48,8 +48,8 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 def write_files(folder: Path, texts: Mapping[str, str]) -> tuple[Path, ...]:
     """Write several files in UTF-8 into a folder, all of them or none; return their paths.
 
-    No file gets its name before all are complete. So a full disk, or a folder that has the name of a file, leaves what
-    was there before.
+    No file gets its name before all are complete. So a full disk, or a folder with the name of the file, leaves the old
+    file as it was.
 
     Args:
         folder: an existing folder.

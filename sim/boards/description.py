@@ -70,7 +70,7 @@ class Serial:
 
 @dataclass(frozen=True)
 class Description:
-    """A board with one of its parts; the attributes are those of its file."""
+    """A board with one of its parts; the attributes are the keys of its file."""
 
     name: str
     family: str

@@ -1,4 +1,4 @@
-"""What to know of a board's drive stage before an amplifier is connected: its newtons, its safe pins, what to see."""
+"""Facts on a board's drive stage before an amplifier is connected: its newtons, its safe pins, and its signals."""
 
 from collections.abc import Callable
 from typing import cast
@@ -84,4 +84,4 @@ def _dac(spec: AxisSpec | AxesSpec) -> str:
 
 
 WHAT: dict[str, Callable[[AxisSpec | AxesSpec], str]] = {"pdm": _pdm, "pwm": _pwm, "dac": _dac}
-"""What a stage is and what to see of it, by its name."""
+"""The text on a stage and its signals, by its name."""

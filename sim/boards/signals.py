@@ -1,4 +1,4 @@
-"""The signals of `top`, the same on every board: what each is, and what it is to be connected to."""
+"""The signals of `top`, the same on every board: their meaning and their connection."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -15,7 +15,7 @@ class Signal:
     Attributes:
         name: its name in the Verilog, and in the constraints.
         out: whether the FPGA drives it.
-        what: what it is, and what to connect it to.
+        what: its meaning, and its connection.
         outside: the resistor that it must have outside the FPGA.
         rest: what a scope shows while nothing but the supply is connected and the axis is DISARMED.
     """
@@ -65,13 +65,13 @@ OF_STAGE = {
         Signal("dac_mosi", True, "serial data of the DAC", DOWN, "low"),
     ),
 }
-"""The pins of each drive stage, the one that is safe first."""
+"""The pins of each drive stage; the pin with the safe level comes first."""
 USUAL = "pdm"
 """The stage of a scene that has none."""
 OF_AXIS = "encoder_a", "encoder_b", "encoder_z", "alive", "drive_pdm", "drive_sign"
 """The signals that each of several axes has."""
 SHARED_LOOPS = "drive_enable", "external_fault", "emergency_stop"
-"""The loops, of which there is one set for all axes."""
+"""The loops; all axes share one set."""
 EVERY = (*_BEFORE, *(signal for signals in OF_STAGE.values() for signal in signals), *_BEHIND)
 """All signals that any board of ours has."""
 
@@ -82,7 +82,7 @@ def signals_of(stage: str) -> tuple[Signal, ...]:
 
 
 def signals_of_axes(axes: int) -> tuple[Signal, ...]:
-    """Return the signals of a board with several axes, those of an axis with its number at the end."""
+    """Return the signals of a board with several axes; an axis's signals end in its number."""
     alone = {signal.name: signal for signal in signals_of(USUAL)}
     theirs = [replace(alone[name], name=f"{name}_{axis}") for axis in range(axes) for name in OF_AXIS]
     once = [alone[name] for name in ("clk", "rst", *SHARED_LOOPS)]

@@ -52,7 +52,7 @@ def top_of_axes(board: Description, clock_hz: int, axes: int) -> str:
 
 
 class Made(NamedTuple):
-    """What a `top` was made for.
+    """The board, clock and drive of a `top`.
 
     Attributes:
         board: the title of the board.
@@ -66,7 +66,7 @@ class Made(NamedTuple):
 
 
 def made_for(text: str) -> Made | None:
-    """Return what a `top` that this module wrote was made for; None for any other text."""
+    """Return the board, clock and drive of a `top` written by this module; None for any other text."""
     found = HEAD.match(text)
     return Made(found[1], int(found[2]), found[3]) if found else None
 
@@ -77,7 +77,7 @@ def drive_of_axes(axes: int) -> str:
 
 
 class Top(NamedTuple):
-    """What `top` is made of.
+    """The parts of a `top`.
 
     Attributes:
         board: the board.
@@ -85,7 +85,7 @@ class Top(NamedTuple):
         drive: its drive, as in `Made`.
         signals: its pins.
         pads: pins with buffers, and the wires behind these.
-        connected: what the ports of `board` are connected to, but for clock, reset and what is inside.
+        connected: the connections of the ports of `board`, except clock, reset and inner signals.
         held: what holds the pins of the drive outside.
     """
 

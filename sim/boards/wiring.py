@@ -1,4 +1,4 @@
-"""What to connect to a board, as a page of Markdown: every signal, its pins, its level, and what to see of it."""
+"""The wiring of a board, as a page of Markdown: every signal, its pins, its level, and how to check it."""
 
 from collections.abc import Iterable
 
@@ -36,7 +36,7 @@ def wiring(board: Description, spec: AxisSpec, picture: str) -> str:
 
 
 def wiring_of_axes(board: Description, spec: AxesSpec) -> str:
-    """Return the page for several axes on a board, which is that with their pins."""
+    """Return the page for several axes on a board, with their pins."""
     said = (
         f"{spec.axes} axes, each with six pins that end in its number. The loops are there once, for all of them, and "
         "there are no pins for complements: leave the cause `encoder_loss` off."
@@ -45,7 +45,7 @@ def wiring_of_axes(board: Description, spec: AxesSpec) -> str:
 
 
 def _page(board: Description, shown: str, signals: str, drives: str) -> str:
-    """Return the page of a board with what is shown of it, the table of its signals, and what is said of its drive."""
+    """Return the page of a board: its picture, the table of its signals, and the text on its drive."""
     notes = "\n".join(f"- {note}" for note in (f"At power-up {board.power_up}.", *board.notes))
     sources = "\n".join(f"- {source}" for source in board.sources)
     return f"""\

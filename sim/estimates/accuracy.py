@@ -1,9 +1,9 @@
 """How accurate a velocity estimator is: known motions at any rate, on any backend, against the exact derivative.
 
 Gains are the estimator's defaults for the signal's own bound C on the acceleration, unless others are given; the bound
-on the jerk is the swing's for every signal, unless another is given. The clock is the slowest multiple of the rate that
-is at least 50 MHz and leaves 50 clocks a sample, enough for every estimator's path. Above 1 MHz the clock is faster
-than that of a real part, so the stamps are finer too. The row reports the clock.
+on the jerk is the swing's for every signal, unless another is given. The clock is the slowest multiple of the rate with
+at least 50 MHz and 50 clocks a sample, enough for every estimator's path. Above 1 MHz the clock is faster than a real
+part's, so the stamps are finer too. The row reports the clock.
 """
 
 import math
@@ -33,7 +33,7 @@ CLOCK_HZ = 50_000_000
 CLOCKS = 50
 DELAY_MAX_S = 0.1
 SCENE = "mhz"
-"""The scene whose device is measured, and whose encoder is given errors."""
+"""The scene with the measured device; its encoder is given errors."""
 FASTEST = {"controller.speed_max_m_per_s": 0.4}
 """The speed up to which the errors of an encoder must leave edges their order: more than the paper's signal has."""
 PHASE = "encoder.phase_error_counts"
@@ -65,8 +65,8 @@ def _device() -> AxisSpec:
 def errors_of(encoder: dict[str, Any] | None) -> Errors:
     """Return the errors of an encoder, given as changes of the scene's keys `encoder.KEY`, with `LEARNED` or without.
 
-    A phase error alone may be as large as the order of edges allows, for the axis has no glitch filter; together with
-    other errors it has the limits of a scene.
+    A phase error alone may be as large as the order of edges allows, because the axis has no glitch filter; together
+    with other errors it has the limits of a scene.
 
     Raises:
         ValueError: if the errors are not valid.
@@ -253,7 +253,7 @@ def measure_recording(recorded: Recording, estimator: str, output: str, backend:
         estimator, output, backend: as for `measure`.
 
     Raises:
-        ReplayError: in one line, what is refused and what is accepted.
+        ReplayError: in one line: the fault, and the accepted values.
         RuntimeError: if the RTL could not be built.
     """
     check_length(recorded)

@@ -6,7 +6,7 @@ as the capture has it, and two edges never fall into one clock: closer ones than
 The reference. At an edge the position is known to a tick: it is the place of the edge on the scale. A cubic curve goes
 from edge to edge, with the slope of a parabola through each edge and those beside it. The curve is monotone between two
 places; where the motion turns, between two edges at one place, it rises by a count at most, as the motion does. Its
-derivative is filtered forward and backward as that of sampled counts is (`reference`).
+derivative is filtered forward and backward, as for sampled counts (`reference`).
 """
 
 import time
@@ -46,7 +46,7 @@ def closest_s(edges: EdgeRecord) -> float:
 
 
 def with_clock(spec: AxisSpec, edges: EdgeRecord, rate_hz: float) -> AxisSpec:
-    """Return an axis with a clock for the edges, at least that which it has.
+    """Return the axis with a clock that suits the edges, at least its own.
 
     Args:
         spec: the axis, in units of its own (`replay_axis`).
@@ -72,8 +72,9 @@ def position_counts(edges: EdgeRecord, rate_hz: float, samples: int) -> np.ndarr
 
 
 def _slopes(times_s: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return the slope of the curve at every edge, counts/s: of the parabola through the edge and those beside it, but
-    no steeper than keeps the curve monotone between two places, and within a count where the motion turns."""
+    """Return the slope of the curve at every edge, counts/s. It is the slope of the parabola through the edge and its
+    two neighbours. It is limited: the curve stays monotone between two places, and within a count where the motion
+    turns."""
     apart_s = np.diff(times_s)
     between = np.diff(places) / apart_s
     steepest = np.where(between == 0, HIGHEST / apart_s, STEEPEST * np.abs(between))

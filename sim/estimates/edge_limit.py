@@ -1,10 +1,10 @@
 """The limit to the velocity that edges tell: the posterior Cramer-Rao bound for a prior of white jerk.
 
 The prior: the jerk is white noise of density S, and every edge is displaced by its own Gaussian error. This is linear
-and Gaussian, so the bound is the covariance of the Kalman filter that knows S and the error, at the edges' own times,
-and no causal estimate has a smaller mean square error over the motions of the prior. S is the one that makes the edges
-of the motion in question most likely. One smooth motion may be read more accurately than the mean motion of the prior,
-and a motion that has impacts has no one density: the bound is a measure, not a wall.
+and Gaussian. So the bound is the covariance of the Kalman filter that knows S and the error, at the edges' own times.
+No causal estimate has a smaller mean square error over the motions of the prior. S makes the edges of the given motion
+most likely. One smooth motion may be read more accurately than the mean motion of the prior, and a motion that has
+impacts has no one density: the bound is a measure, not a wall.
 """
 
 import math
@@ -32,7 +32,7 @@ def edges_of(signal: signals.Signal, spec: AxisSpec, offsets, scale=None, lines=
     passed = encoded_signal(signal, spec, offsets, scale, lines)
     within = np.array(STEPS)[np.append(passed.start_level, passed.edges.levels)]
     up = (np.diff(within) + 1) % 4 - 1
-    # Going up the edge is that of the new cell, going down that of the old one.
+    # Going up, the edge belongs to the new cell; going down, to the old one.
     return passed.edges.clocks / spec.clock_hz, np.cumsum(up) + (up < 0).astype(float)
 
 
@@ -78,7 +78,7 @@ def limit(signal: signals.Signal, spec: AxisSpec, error_counts: float, *errors) 
     Args:
         signal: the motion, judged as by `accuracy`.
         spec: the axis.
-        error_counts: RMS error of an edge, counts; that of the stamps is added.
+        error_counts: RMS error of an edge, counts; the error of the stamps is added.
         errors: the errors of the encoder, as from `accuracy.errors_of`.
     """
     times, places = edges_of(signal, spec, *errors)

@@ -1,16 +1,16 @@
 """Rate-hardness of a wall: how fast its force rises at contact, over the speed of the contact, N/m.
 
-The metric is that of Lawrence, Pao, Dougherty, Salada and Pavlou (2000): the initial rate of change of the force over
-the velocity of penetration. The handle is moved into the wall at a constant speed v. The force is 0 before the contact,
-and its initial rate of change is that to the time W behind it,
+The metric is from Lawrence, Pao, Dougherty, Salada and Pavlou (2000): the initial rate of change of the force over the
+velocity of penetration. The handle is moved into the wall at a constant speed v. The force is 0 before the contact, and
+its initial rate of change is that to the time W behind it,
 
     rate-hardness = push(W) / (W v),
 
-where push(W) is the mean push from 0.9 W to 1.1 W, so that it is not one step of a held force, or one sample of a noisy
-estimate. A wall of K and B that is neither late nor held has K + B / W: its force is B v at once, a step of infinite
-rate, and then rises by K v. So the first force that acts is said apart, and how long after the contact.
+where push(W) is the mean push from 0.9 W to 1.1 W: not one step of a held force, nor one sample of a noisy estimate. A
+wall of K and B that is neither late nor held has K + B / W: its force is B v at once, a step of infinite rate, and then
+rises by K v. So the first force that acts is said apart, and how long after the contact.
 
-The contact is the time at which the handle passes position 0. The wall's first force is that of its first count.
+The contact is the time at which the handle passes position 0. The wall's first force comes with its first count.
 """
 
 import math
@@ -24,7 +24,7 @@ from .motions import Steady
 from .moved_handle import Answer
 
 LEAD_S = 0.1
-"""The time for which the handle moves before the contact, if the travel is long enough: the estimators settle."""
+"""The time of motion before the contact, s, if the travel is long enough: the estimators settle in it."""
 STEP_S = 1e-3
 """The time in which edges are looked for at once."""
 MEAN = 0.1
@@ -37,14 +37,14 @@ def ideal_n_per_m(scene: Scene, window_s: float) -> float:
 
 
 def lead_s(scene: Scene, speed_m_per_s: float) -> float:
-    """Return the time for which the handle moves before the contact: that of two counts at least."""
+    """Return the time of motion before the contact, s: at least the time of two counts."""
     longest_s, two_s = (way_m / speed_m_per_s for way_m in (scene.controller.travel_m / 2, 2 * scene.encoder.count_m))
     return max(min(LEAD_S, longest_s), two_s)
 
 
 def path(scene: Scene, speed_m_per_s: float, from_: Start) -> tuple[Steady, float]:
-    """Return the motion from a start, and the time of the contact (s): the handle begins at that place in a count, and
-    has moved for that part of a period of the force."""
+    """Return the motion from a start, and the time of the contact (s). The handle begins at the start's place in a
+    count, and at its phase in a period of the force."""
     count_m, period_s = scene.encoder.count_m, 1 / scene.controller.actuation_hz
     counts = math.ceil(speed_m_per_s * (lead_s(scene, speed_m_per_s) + period_s) / count_m)
     start_m = (from_.counts - counts) * count_m + speed_m_per_s * from_.periods * period_s

@@ -1,4 +1,4 @@
-"""What stiffness and damping a wall renders to a handle that is moved sinusoidally inside of it, by frequency.
+"""The stiffness and damping that a wall renders to a handle in sinusoidal motion inside it, by frequency.
 
 With x = c + A sin wt, the push is projected on both parts of the motion over a window of whole periods:
 
@@ -8,9 +8,9 @@ The push is a constant from one change of the drive to the next, so its integral
 number of the force's periods, too: then what is left of the sampling, at sums and differences of both frequencies,
 adds nothing to the projection.
 
-Counts are the only other thing that does. The count of a sample is less than the place by up to a count: as a place
-that error has at most a component of q at w, and where every sample changes the drive, a linear estimator's loop makes
-of it what it makes of A. So K_r + j w B_r is then wrong by at most q / A of its magnitude, and by the words' rounding.
+Counts are the only other thing that does. The count of a sample is below the place by up to a count. As a place, this
+error has at most a component of q at w. Where every sample changes the drive, a linear estimator's loop treats this
+component like A. So K_r + j w B_r is then wrong by at most q / A of its magnitude, and by the words' rounding.
 """
 
 import math

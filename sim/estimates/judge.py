@@ -4,8 +4,8 @@ With v the true velocity and w the estimate, over the judged samples:
 
 - `rms`, `largest`: the RMS and the largest magnitude of w - v;
 - `chatter`: the RMS of w - v less its mean over each 10 ms: the part that a damper turns into noise;
-- `delay_s`: the delay d for which v(t - d) correlates best with w(t); None where v does not vary, w is zero, or no such
-  d is within the limits.
+- `delay_s`: the delay d with the best correlation of v(t - d) and w(t). None if v does not vary, w is zero, or the best
+  d is beyond the limits.
 
 The correlation is over means of blocks, at most `DELAY_POINTS` of them; within a block v must be nearly straight.
 """
@@ -24,8 +24,8 @@ DELAY_STEPS = 400
 def _inner(one: np.ndarray, other: np.ndarray) -> float:
     """Return the inner product of two arrays.
 
-    A product by BLAS is spread over threads, which takes ten times as long for arrays of this size, and its last digits
-    are those of the number of cores.
+    BLAS spreads a product over threads. For arrays of this size this is ten times slower, and the last digits depend on
+    the number of cores.
     """
     return float(np.sum(one * other))
 
@@ -65,7 +65,7 @@ class Judge:
         self.largest = 0.0
 
     def add(self, first: int, estimate: np.ndarray, exact: np.ndarray) -> None:
-        """Add the samples of a chunk, the first of which has the number `first`."""
+        """Add the samples of a chunk; `first` is the number of its first sample."""
         error = estimate - exact
         self._squares += _inner(error, error)
         self.largest = max(self.largest, float(np.abs(error).max(initial=0.0)))

@@ -1,8 +1,8 @@
 """Training passes of an encoder, and the map of its scale that they give: swings by hand, seen by their edges alone.
 
-A pass is a swing from the middle of the scale: amplitude, decay, frequency and direction are drawn by the encoder's
-seed and the number of the pass, and the jitter is that of another time. All that is taken of it are the edges that the
-axis decodes, with their stamps; the count is referenced at the start, as by homing.
+A pass is a swing from the middle of the scale. The encoder's seed and the number of the pass determine amplitude,
+decay, frequency and direction. The jitter is drawn anew for each pass. Only the axis's decoded edges with their stamps
+are used. The count is referenced at the start, as by homing.
 """
 
 from typing import NamedTuple
@@ -76,6 +76,8 @@ def check(passes: int, estimator: str, backend: str) -> None:
     if isinstance(passes, bool) or not isinstance(passes, int) or not 1 <= passes <= PASSES_MAX:
         raise ValueError(f"encoder.learned_passes must be a whole number from 1 to {PASSES_MAX}, not {passes!r}")
     if estimator != ESTIMATOR:
-        raise ValueError(f"encoder.learned_passes must be for {ESTIMATOR}, which takes a map, not for {estimator!r}")
+        raise ValueError(
+            f"encoder.learned_passes must be for {ESTIMATOR}, which takes a map of the scale, not for {estimator!r}"
+        )
     if backend == "rtl":
         raise ValueError("encoder.learned_passes must be on float or fixed: the RTL of an axis has no port for a map")

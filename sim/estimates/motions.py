@@ -257,8 +257,8 @@ class Encoded(NamedTuple):
 def encoded(motion, encoder: Encoder, seconds: float, step_s: float, offset_clocks: int) -> Encoded:
     """Return the edges of a motion from time 0 on, in order of time.
 
-    An edge that is passed at time t is stamped ceil(t clock_hz) + offset_clocks moving up, floor(t clock_hz) + 1 +
-    offset_clocks moving down, as everywhere (`sim.world.encoder`); with lines by the time at which it is shown.
+    An edge passed at time t is stamped ceil(t clock_hz) + offset_clocks moving up, floor(t clock_hz) + 1 +
+    offset_clocks moving down, as in `sim.world.encoder`. With lines, t is the time at which the edge is shown.
 
     Args:
         motion: one of this module's motions.

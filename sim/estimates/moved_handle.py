@@ -1,8 +1,8 @@
-"""A handle that is moved along a known path, whatever pushes it, and the force with which the wall of a scene answers.
+"""A handle on a prescribed path, whatever pushes it, and the force of a scene's wall on it.
 
-The encoder's edges, the decoder's time, the clocks up to the changed drive, the hold until the next one, an amplifier's
-delay and the steps of a converter are those of the closed loop. What is behind them is left out: an amplifier's lag, a
-motor, a cable, and a carrier's pulses about their mean; and handle and hand, for the path is given.
+Six things are as in the closed loop: the encoder's edges, the decoder's time, the clocks up to the changed drive, the
+hold, an amplifier's delay and a converter's steps. What is behind them is left out: an amplifier's lag, a motor, a
+cable, and a carrier's pulses about their mean; and handle and hand, because the path is given.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from .playback import take
 
 
 class MotionError(ValueError):
-    """A handle cannot be moved so: one line that says how, and what is accepted."""
+    """A handle cannot be moved like this; the message is one line with the accepted values."""
 
 
 def check(moved: str, *quantities: tuple[str, float, float, float, str]) -> None:
@@ -37,7 +37,7 @@ def check(moved: str, *quantities: tuple[str, float, float, float, str]) -> None
 
 @compiled
 def _drives(controller, state, timing, edges, drives):
-    """Fill `drives` with those of the samples from the first on; return the state."""
+    """Fill `drives` from the first sample on; return the state."""
     taken = 0
     for k in range(len(drives)):
         state, taken = take(controller, state, timing, edges, taken, k)

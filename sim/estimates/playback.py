@@ -1,8 +1,8 @@
 """Playback of a known motion through an axis on any backend: velocities in chunks, without a plant or a wall.
 
-The edges are placed so that the count at the strobe of sample k is exactly that of the position at time k / sample_hz.
-The decoder's latency is left out, because it is the same for every estimator. A stamp is the clock in which its edge
-was decoded. The pins have no glitches but those that are asked for, and `accuracy.axis_spec` has no filter.
+The edges are placed so that the count at the strobe of sample k is exactly the count of the position at time k /
+sample_hz. The decoder's latency is left out, because it is the same for every estimator. A stamp is the clock in which
+its edge was decoded. The pins have no glitches except wanted ones, and `accuracy.axis_spec` has no filter.
 """
 
 from collections.abc import Iterator
@@ -31,7 +31,7 @@ Offsets = tuple[float, float, float, float]
 
 @inlined
 def take(controller, state, timing, edges, taken, k):
-    """Take sample k of a record of edges, of which so many are taken; return (state, number of edges taken)."""
+    """Take sample k of a record of edges, after `taken` edges; return (state, number of edges taken)."""
     strobe, remaining = strobe_of(timing, k), len(edges.clocks) - taken
     if remaining > 0 and edges.clocks[taken] < change_of(timing, k):
         rest = Edges(edges.clocks[taken:], edges.levels[taken:])

@@ -37,7 +37,7 @@ class Replay(Summary):
         coarsen: divisor of the counts that the estimator saw (floor division).
         acceleration_max_counts_per_s2: the bound C that set the gains.
         gains: the gains by name, with their units.
-        clock_hz: clock of the axis: that of its pins, without meaning where the counts do not go through pins.
+        clock_hz: clock of the axis and of its pins; without meaning if the counts do not go through pins.
         velocity_counts_per_s: the estimate.
         difference_counts_per_s: the plain finite difference of the same counts.
         reference_counts_per_s: the zero-phase derivative of the recorded counts.
@@ -171,7 +171,7 @@ def replay(
         settings: gains and bounds that do not follow from C.
 
     Raises:
-        ReplayError: in one line, what is refused and what is accepted.
+        ReplayError: in one line: the fault, and the accepted values.
         RuntimeError: if the RTL could not be built.
     """
     output = check_names(estimator, output, backend)

@@ -1,9 +1,10 @@
-"""What a replay runs: the checks of its arguments, the reference, the bound C and the axis, before anything is run.
+"""The plan of a replay: the checks of its arguments, the reference, the bound C and the axis, before anything is run.
 
 The bound C on the acceleration, from which an estimator gets its gains, is computed by `reference` unless it is given.
-A recording that hardly accelerates gets a C that moves one count over its whole length, which the counts cannot
-distinguish from no acceleration, or the least C that the words can hold with its travel and speed
-(`model.motion.ACCELERATION_RANGE`). A change too fast for the pins at a clock of `CLOCK_MAX_HZ` is an error.
+A recording that hardly accelerates gets a C that moves one count over its whole length: the counts cannot distinguish
+this from no acceleration. Or it gets the least C that the words can hold with its travel and speed
+(`model.motion.ACCELERATION_RANGE`), if that is larger. A change too fast for the pins at a clock of `CLOCK_MAX_HZ` is
+an error.
 """
 
 from typing import NamedTuple
@@ -34,7 +35,7 @@ DERIVED = Settings()
 
 
 class ReplayError(ValueError):
-    """A replay that is refused: one line with what is wrong and what is accepted."""
+    """A replay is refused. The message is one line: the fault, and the accepted values."""
 
 
 class ArgumentError(ReplayError):
@@ -127,7 +128,7 @@ def _check_edges(recording: Recording, edges: EdgeRecord) -> None:
 
 
 class Plan(NamedTuple):
-    """What is derived from a recording before its counts are run.
+    """The values derived from a recording before its counts are run.
 
     Attributes:
         counts: the counts that the estimator sees.
@@ -153,10 +154,10 @@ def plan(
     acceleration_max_counts_per_s2: float | None = None,
     settings: Settings = DERIVED,
 ) -> Plan:
-    """Derive what a replay runs; the arguments are those of `replay`.
+    """Return the plan of a replay; arguments as of `replay`.
 
     Raises:
-        ReplayError: in one line, what is refused and what is accepted.
+        ReplayError: in one line: the fault, and the accepted values.
     """
     rate, given = recording.rate_hz, acceleration_max_counts_per_s2
     time = RecordTime(rate)

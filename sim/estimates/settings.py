@@ -1,4 +1,4 @@
-"""What a replay sets of its axis beyond C: the gains, the bound on the jerk, and the error of single edges.
+"""The settings of a replay's axis besides C: the gains, the bound on the jerk, and the error of single edges.
 
 Everything is in recorded counts and true seconds, by the keys that a scene has with metres: `gains.ESTIMATOR.NAME`,
 `jerk_max_counts_per_s3` and `edge_error_max_counts` of its section `controller`. An axis counts in samples: see
@@ -46,7 +46,7 @@ BOUNDS = {
 
 
 class SettingError(ValueError):
-    """A setting that is refused: one line with its key, and what is accepted."""
+    """A setting is refused; the message is one line with its key and the accepted values."""
 
 
 def settings_of(changes: Mapping[str, Any], estimator: str) -> Settings:
@@ -81,7 +81,7 @@ def settings_of(changes: Mapping[str, Any], estimator: str) -> Settings:
 
 
 def names_of(estimator: str) -> dict[str, str]:
-    """Return the gains of an estimator: the names that they have here, and those of its class."""
+    """Return the gains of an estimator: their names here, and their names in its class."""
     return {in_counts(name): name for name in registry.design_of(estimator).gains_class.__annotations__}
 
 

@@ -1,4 +1,4 @@
-"""The signals that estimators are judged on: named motions, their durations, and the times from which errors count."""
+"""The test signals of estimators: named motions, their durations, and the times from which errors count."""
 
 import cmath
 import math

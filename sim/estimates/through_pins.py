@@ -1,7 +1,7 @@
 """Recorded counts through a controller's pins.
 
-The change from one sample to the next becomes edges that are spread evenly over the interval and moved by the
-decoder's latency, so that the count at every strobe is the recorded count. The decoder starts at the first sample.
+The change from one sample to the next becomes edges, spread evenly over the interval and moved by the decoder's
+latency. So the count at every strobe is the recorded count. The decoder starts at the first sample.
 """
 
 import time

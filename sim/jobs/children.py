@@ -1,11 +1,11 @@
 """Child processes that end with this process, for whatever reason it ends, and their own children with them.
 
-The children are in a process group that is led by a guard, a shell that waits for the end of a pipe from this process.
-The system closes the pipe when this process ends, even by SIGKILL, and the guard kills the group, with itself. Since a
+The children are in a process group led by a guard: a shell that waits for the end of a pipe from this process. The
+system closes the pipe when this process ends, even by SIGKILL, and the guard kills the group, with itself. Since a
 group contains the children of its members, all that a build starts ends with it.
 
-This holds on every POSIX system, for processes that stay in their group. The one thing that cannot be survived is
-SIGKILL of a guard together with this process.
+This holds on every POSIX system, for processes that stay in their group. The only exception is a SIGKILL of a guard
+together with this process.
 """
 
 import os
@@ -21,11 +21,11 @@ from ...model.runtime.termination import undone
 GUARD = ("/bin/sh", "-c", "trap '' HUP INT TERM; read line; kill -KILL 0")
 
 _living: dict["Group", int] = {}
-"""The groups that there are, and the identity of the thread that began each."""
+"""The existing groups, each with the identity of the thread that began it."""
 
 
 class Group:
-    """A context with a process group, all of which is killed at the end of the context or of this process.
+    """A context with a process group: the end of the context, or of this process, kills the whole group.
 
     Attributes:
         number: the number of the group, while the context lasts.

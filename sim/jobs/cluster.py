@@ -36,7 +36,7 @@ SILENT = ("asyncio", "distributed", "tornado")
 
 
 class AddressError(ValueError):
-    """A text that cannot be the address of a scheduler; the message says what can."""
+    """A text cannot be the address of a scheduler; the message says what is accepted."""
 
 
 def check_address(text: str) -> None:
@@ -161,8 +161,9 @@ def _watched(client: Client, scheduler: str) -> Iterator[None]:
 def _check_scheduler(address: str) -> None:
     """Raise RuntimeError if no Dask scheduler answers at an address within `TIMEOUT_S`.
 
-    A Dask client waits for ever on a peer that accepts the connection and says nothing, and what a peer of another kind
-    says may break it in any way. So the question is put by a thread that is left to itself when its time is over.
+    A Dask client waits for ever on a peer that accepts the connection and sends nothing. The answer of a peer of
+    another kind may break the client in any way. So the question is put by a thread that is left to itself when its
+    time is over.
     """
     answer: Answer = Answer()
 
@@ -178,7 +179,7 @@ def _check_scheduler(address: str) -> None:
     except Exception as error:
         raise RuntimeError(f"no Dask scheduler answers at {address}: {_why(error)}") from None
     if kind != "Scheduler":
-        raise RuntimeError(f"no Dask scheduler answers at {address}: what answers is no scheduler")
+        raise RuntimeError(f"no Dask scheduler answers at {address}: the server there is no scheduler")
 
 
 def _why(error: BaseException) -> str:

@@ -33,8 +33,8 @@ class Threads:
     """A context in which threads of this process do jobs.
 
     Compiled kernels and the tools that a job waits for run side by side; the Python between them does not. If the
-    context is left by an exception, no other job begins, the tools of those under way are killed, also those that they
-    begin from then on, and their kernels are waited for.
+    context is left by an exception, no other job begins. The tools of the jobs under way are killed, also tools that
+    they start from then on, and their kernels are waited for.
 
     Args:
         jobs: the most jobs at a time.

@@ -1,7 +1,7 @@
-"""Folders that a user names: written whole or not at all, and never over what somebody else has put there.
+"""Folders named by a user: written completely or not at all, and never over another's files.
 
-A folder of this module has the list of `whole_folder.py`, by which it is known again: it may be replaced while it has
-no other files, and those of the list are as they were written.
+A folder of this module has the list of `whole_folder.py`, which identifies it. It may be replaced while it has no other
+files, and the listed files are unchanged.
 """
 
 import os
@@ -18,7 +18,7 @@ from .whole_folder import LIST, is_as_listed, listed_in, seal
 def foreign(folder: Path) -> str | None:
     """Return the name of what keeps a folder from being replaced; None if nothing does.
 
-    That is a file in the place of the folder, something in it that is not in its list, or a file that is not as listed.
+    It is a file in the place of the folder, an entry that is not in its list, or a changed file.
 
     Raises:
         OSError: if the folder cannot be read.
@@ -36,12 +36,12 @@ def foreign(folder: Path) -> str | None:
 
 
 def write_folder(folder: Path, make: Callable[[Path], None]) -> None:
-    """Put a folder with the content that `make` gives it in the place of a folder that may be replaced.
+    """Replace a folder by a new one with the content from `make`, if it may be replaced.
 
     It is made beside its place. A link to a folder stays one.
 
     Args:
-        folder: the folder, of which `foreign` is None; the folders above it are made.
+        folder: the folder; `foreign` of it is None. The folders above it are made.
         make: a function that fills an empty folder with files.
 
     Raises:

@@ -7,7 +7,7 @@ from .job_pool import Threads
 from .store import Store
 
 Run = Callable[[str, Callable[..., Any], list[dict]], list[Any]]
-"""What a study has its jobs done by: it returns their results, by a title, the function, and the arguments of each."""
+"""The runner of a study's jobs: it takes a title, the function, and each job's arguments, and returns the results."""
 
 
 def run(

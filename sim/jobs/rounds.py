@@ -1,6 +1,6 @@
 """Timing of contestants side by side, in rounds, with the median of each.
 
-In every round each contestant runs once, so that a machine that slows down slows them all.
+In every round each contestant runs once, so a machine that slows down slows all of them.
 """
 
 import statistics
@@ -13,7 +13,7 @@ def medians(
     """Return the median over the rounds of every contestant's results.
 
     Args:
-        contestants: functions by name, each of which returns one result.
+        contestants: functions by name; each returns one result.
         rounds: number of runs of every contestant.
         progress: called with a text that names the next run.
     """

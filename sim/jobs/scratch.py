@@ -15,10 +15,11 @@ PREFIX = "building-"
 
 @contextmanager
 def scratch(parent: Path) -> Iterator[Path]:
-    """Provide a temporary folder in `parent`, which is made if it is missing; remove what ended processes left there.
+    """Provide a temporary folder in `parent`, which is made if missing; remove the folders left there by ended
+    processes.
 
-    The process holds a lock on the folder's file `lock`. The system releases it when the process ends, even by
-    SIGKILL, so that the next process knows which folders are left over.
+    The process holds a lock on the folder's file `lock`. The system releases it when the process ends, even by SIGKILL.
+    So the next process knows the left-over folders.
     """
     parent.mkdir(parents=True, exist_ok=True)
     for folder in parent.glob(f"{PREFIX}*"):

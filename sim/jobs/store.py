@@ -2,12 +2,12 @@
 
 A store is a file of one JSON line for each result: a digest of the rest of the line, a digest of the job, by which the
 result is found, and the result. It belongs to the exact sources of this project and the versions of its tools: any
-change begins a new store. The line break comes before the text of a line, so that a part of a line, left by a process
-that was killed while it wrote, spoils no other line. A line that does not fit its digest is skipped, and its result
-computed again.
+change begins a new store. The line break comes before the text of a line. So a part of a line, left by a process that
+was killed while it wrote, spoils no other line. A line that does not fit its digest is skipped, and its result computed
+again.
 
-The digest says what this process runs only while its sources are what they were when it began. If one is written
-meanwhile, nothing is taken from a store any more, nothing is kept, and a warning says so.
+The digest is valid only while the sources are unchanged since the process began. If one is written meanwhile, nothing
+is taken from a store any more, nothing is kept, and a warning says so.
 """
 
 import errno
@@ -86,7 +86,7 @@ def are_as_they_were() -> bool:
     now_ns = time.time_ns()
     for path in _names():
         try:
-            # This time cannot be set by hand. One in the future is that of another clock.
+            # This time cannot be set by hand. A time in the future comes from another clock.
             written = sim.BEGAN_NS < os.stat(path).st_ctime_ns <= now_ns
         except OSError:
             written = True

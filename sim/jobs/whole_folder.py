@@ -1,7 +1,7 @@
 """Folders that are made whole, and checked before they are used: built hardware, netlists, placements.
 
-A list of the digests of all files, in the form of the tool sha256sum, is the last file to be written. A folder whose
-files are not those of its list, half a library after a power cut perhaps, counts as absent and is made again.
+A list of the digests of all files, in the form of the tool sha256sum, is the last file to be written. If a folder's
+files differ from its list, perhaps after a power cut, it counts as absent and is made again.
 """
 
 import atexit

@@ -1,10 +1,10 @@
 """A virtual coupling in the loop: a tool that a host simulates, and an axis that couples the handle to it.
 
 Every `period` samples the host takes a sample's count and velocity, and advances the tool by that time. `latency`
-samples after the one that it has taken the tool's position and velocity are the surface of the axis's wall, whose
-spring and damper, at every sample, are the coupling. The surface stands still until it is moved again; so that it is
-not behind on the average, the host may put it where the tool will be `ahead_s` later. The tool has a mass, and a wall
-of its own at position 0:
+samples later, the tool's position and velocity become the surface of the axis's wall. The wall's spring and damper act
+at every sample: they are the coupling. The surface stands still until it is moved again; so that it is not behind on
+the average, the host may put it where the tool will be `ahead_s` later. The tool has a mass, and a wall of its own at
+position 0:
 
     mass (v' - v) = T (coupling (handle - x') + damping (handle velocity - v') - push),     x' = x + T v'
     push = K x' + B v'      if without it x' were greater than 0, else 0; with `forbid_pull`, not below 0
@@ -47,7 +47,7 @@ class Tool(NamedTuple):
 
 
 class ToolState(NamedTuple):
-    """A tool, the words of the surface that it is at, and those that the surface will be at."""
+    """A tool, and the words of its surface, now and next."""
 
     phase: int  # samples since the host has taken one
     position_m: float
@@ -66,7 +66,7 @@ class Coupled(NamedTuple):
 
 
 class CoupledState(NamedTuple):
-    """The state of a controller, with its outputs, and that of the tool."""
+    """The state of a controller with its outputs, and the state of the tool."""
 
     drive: float
     velocity: float
@@ -177,7 +177,7 @@ def _counted_hardware(controller, state):
 
 @inlined
 def _after(coupled, state, tool):
-    """Return the state after a sample of the controller, of which the host has taken its part."""
+    """Return the state after a sample of the controller and the host's part of it."""
     if tool.phase == 0:
         tool = advanced(coupled.tool, tool, counted(coupled.controller, state), state.velocity)
     phase, position, velocity = tool.phase + 1, tool.position, tool.velocity

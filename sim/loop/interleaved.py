@@ -1,8 +1,8 @@
 """The closed loops of several axes around one piece of hardware, whose loops take turns sample by sample.
 
-The hardware runs up to the clock at which the drive of one axis changes, and must then have the edges of all others up
-to that clock. So a loop is a generator that stops when its edges up to its own next change are given, and waits there
-until those of the others are: in the order of the rota, the hardware is never ahead of an edge.
+The hardware runs up to the clock at which the drive of one axis changes. It must then have the edges of all other axes
+up to that clock. So a loop is a generator. It stops when it has given its edges up to its own next change, and waits
+until the other loops have given theirs. In the order of the rota, the hardware is never ahead of an edge.
 
     for done in zip(*(turns(...) for each axis)): ...
 """
@@ -38,7 +38,7 @@ def _give(controller, moment, edges):
 
 @compiled
 def _sampled(controller, changed):
-    """Return what the hardware has made of a sample whose drive changes at that clock."""
+    """Return the hardware's outputs for the sample whose drive changes at that clock."""
     context, axis = controller.context, controller.axis
     drive = call(controller.drive, context, axis, changed, 0, 0)
     velocity = call(controller.read, context, axis, READ_VELOCITY, 0, 0)

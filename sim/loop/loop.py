@@ -4,8 +4,8 @@ Time is the FPGA's clock. Sample k is taken at its strobe (`design.strobe_of`), 
 follows from it changes `latency` clocks later, on every backend. The plant is advanced exactly over the two intervals
 between those instants, under a constant force in each.
 
-Where samples overlap, the next strobe comes before that, or several: the plant is then so many strobes ahead of the
-sample whose drive changes, and a model leaves the edges in between to the next samples.
+Where samples overlap, one or several strobes come before that. The plant is then so many strobes ahead of the sample
+whose drive changes. A model leaves the edges in between to the next samples.
 """
 
 from ...model.axis.design import change_of, overlap_of, strobe_of

@@ -9,7 +9,7 @@ from ..world.lines import carry
 def shown(waiting, lines, clock_hz, before, moment, interval):
     """Return the `Moment` after an interval with the edges that the pins show up to its end.
 
-    Without lines no array is passed, which would cost as much as a handle that moves.
+    Without lines no array is passed: it would cost as much as a moving handle.
 
     Args:
         waiting: the `Waiting` of the encoder's lines; None without lines, and the moment is as it was.

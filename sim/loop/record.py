@@ -1,4 +1,4 @@
-"""What is kept of a run's samples, for pictures and traces."""
+"""The record of a run's samples, for pictures and traces."""
 
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,21 +1,22 @@
 """Samples of a handle that sweeps over the scale: counts from cells, without the edges between them.
 
-The time of an edge is found by Newton's method, and each is decoded; a handle in free motion at 10 kHz passes dozens in
-a sample, and nothing but the count comes of them if the estimator uses no stamps. The count at a strobe is the number
-of the cell that held the position the decoder's latency earlier, plus a constant: an edge counts from `latency` clocks
-after the clock that first sees it, and a clock sees the position at its own time. So one position a sample is enough.
+In the loop the time of every edge is found by Newton's method, and every edge is decoded. A handle in free motion at 10
+kHz passes dozens of edges in a sample. Only the count matters if the estimator uses no stamps. The count at a strobe is
+a constant plus the number of the cell that held the position one decoder latency earlier. Reason: an edge counts from
+`latency` clocks after the clock that first sees it, and a clock sees the position at its own time. So one position a
+sample is enough.
 
 That holds for edges that the decoder takes one at a time. So a sample is swept only if, from the last changed drive to
 the next,
 
 - the velocity keeps its sign: no turn, no rest, and every level lasts;
-- the speed stays below that at which the closest edges of the scale are so many clocks apart that each is decoded
-  before the next one comes (`Sweep.most_m_per_s`);
+- the speed stays so low that, at the closest edges of the scale, each edge is decoded before the next one comes
+  (`Sweep.most_m_per_s`);
 - the position that is counted is farther from any edge than the rounding of an edge's time;
 - the count stays within its range.
 
-All that is known before anything of the sample is done. What is not swept is left to the loop, which needs the decoder
-as the edges leave it: those of the last swept sample are found after all, and decoded from rest.
+All that is known before anything of the sample is done. Samples that are not swept are left to the loop. It needs the
+decoder's state, so the edges of the last swept sample are found after all, and decoded from rest.
 """
 
 from typing import NamedTuple
@@ -107,7 +108,7 @@ def sweep(constants, world, controller, state, progress, memory, first, until):
         world, memory: as in `loop`.
         controller, state: `stamped.Controller` and `stamped.State`.
         progress: the `Progress` right after the change of the drive: `sample` is the sample that it comes from. The
-            progress that is returned is such a one, too; nobody asks what was `taken`.
+            returned progress is such a one, too; its `taken` is not used.
         first: number of the sample whose place in the arrays is the first.
         until: number of the first sample not to take.
     """

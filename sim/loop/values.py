@@ -1,7 +1,6 @@
 """The values that a run of the closed loop takes, writes to and returns.
 
-A part that a scene lacks (`converter`, `sweep`, `delay`, `waiting`, what is kept) is None, and then has no machine
-code.
+A missing part of a scene (`converter`, `sweep`, `delay`, `waiting`, kept samples) is None, and has no machine code.
 """
 
 from typing import NamedTuple
@@ -29,8 +28,8 @@ EDGE_CAPACITY = 1 << 14
 class World(NamedTuple):
     """The plant and parts that the controller is connected to, with their timing.
 
-    `before` is the time from a changed drive to the next strobe, `after` the time from the last strobe to the changed
-    drive: of the sample itself, or of a later one if samples overlap.
+    `before` is the time from a changed drive to the next strobe. `after` is the time from the last strobe to the
+    changed drive: the sample's own strobe, or a later one if samples overlap.
     """
 
     plant: Plant
@@ -54,8 +53,8 @@ class Sweep(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """The state of the loop before the drive of `sample` changes: at its strobe or, if samples overlap, at that of the
-    last one that is taken before then."""
+    """The state of the loop before the drive of `sample` changes: at its strobe or, if samples overlap, at the last
+    strobe before the change."""
 
     sample: int
     moment: Moment

@@ -122,7 +122,8 @@ def _against_rate(rows: list[dict], labels: list[str]) -> Figure:
 
 
 def _message(rows: list[dict], labels: list[str]) -> str:
-    """Return whose error grows most with the rate, and whose is the least, as a line of the title; of one rate none."""
+    """Return a line of the title: the estimator whose error grows most with the rate, and the best one; none for one
+    rate."""
     first, last = (pick(row["sample_hz"] for row in rows) for pick in (min, max))
     errors = {(label, row["sample_hz"]): row["rms_mm_s"] for row, label in zip(rows, labels, strict=True)}
     if first == last or not all((label, hz) in errors for label in labels for hz in (first, last)):

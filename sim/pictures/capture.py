@@ -9,7 +9,7 @@ from ...host.capture import Captured
 from .style import FORCE, MARK, WALL, new_figure, page
 
 FLAG_HEIGHT = 0.7
-"""The height of the bar of a flag that is set, of the room that it has."""
+"""The height of a set flag's bar, as a fraction of its room."""
 
 
 class Shows(Protocol):

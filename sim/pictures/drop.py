@@ -104,7 +104,7 @@ def _rest(drop: Drop) -> Figure:
 
 
 def _kind(rms_m: float | None, threshold_m: float) -> int:
-    """Return 0 if a handle is at rest, 1 if it is shaken by less than the threshold, 2 if by more or if it fled."""
+    """Return 0 if a handle is at rest, 1 if it is shaken below the threshold, 2 if above or if it fled."""
     if rms_m is None or rms_m >= threshold_m:
         return 2
     return int(rms_m >= AT_REST_M)

@@ -1,7 +1,7 @@
 """The picture of two hits side by side, and the same in motion: a handle, its position and the wall's force.
 
-The handle is drawn to scale, and a film shows it in real time. Force and position are those of the traces, which are
-kept about every millisecond; the force is the range from each kept sample up to the next.
+The handle is drawn to scale, and a film shows it in real time. Force and position come from the traces, which keep a
+sample about every millisecond. The force is drawn as its range from one kept sample to the next.
 """
 
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ COLOURS = 64
 
 @dataclass
 class _Side:
-    """What moves on one side: parts of the handle with their offsets (mm) from its front, curves, and the verdict."""
+    """The moving parts of one side: parts of the handle by their offsets (mm) from its front, curves, the verdict."""
 
     hit: Hit
     parts: list[tuple[Rectangle | Line2D, float]]

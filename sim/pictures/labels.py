@@ -99,8 +99,8 @@ def label_points(
 ) -> list[Annotation]:
     """Write labels beside points or curves of a panel, at the nearest free position, with a leader where it is far.
 
-    A position is free if it is in the panel, covers nothing, and is nearer to the label's own point or curve than to
-    anything else. The panel's limits must be final, and the figure must be laid out.
+    A position is free if it is in the panel, covers nothing, and is nearest to the label's own point or curve. The
+    panel's limits must be final, and the figure must be laid out.
 
     Args:
         axes: the panel.

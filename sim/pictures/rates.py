@@ -166,7 +166,7 @@ def _message(errors: Curves, stiffest: Curves) -> str:
 
 
 def _where(curves: Curves, other: str, lower: bool) -> str:
-    """Return at which rates the interval of the low pass is below (`lower`) or above that of another estimator."""
+    """Return the rates at which the interval of the low pass is below (`lower`) or above another estimator's."""
     pairs = zip(curves.get(LOW_PASS, []), curves.get(other, []), strict=True)
     wins = [(ours.rate_hz, ours.high < its.low if lower else ours.low > its.high) for ours, its in pairs]
     where = [rate_hz for rate_hz, better in wins if better]

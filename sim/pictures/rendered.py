@@ -15,7 +15,7 @@ COMMANDED = {"color": "black", "ls": ":", "lw": 1.1, "zorder": 1.5}
 INKS = "#CC79A7", "#D55E00", "#0072B2", "#009E73", "#56B4E9", "#E69F00", "#444444", "#999933"
 """The colours of rates, from the slowest on; more rates begin anew."""
 STIFFNESS, DAMPING, HARDNESS = (0.4, 1.6), (-0.75, 1.75), (0.0, 2.3)
-"""What the panels show, in parts of what is commanded; a line that leaves a panel is cut."""
+"""The range of the panels, as a fraction of the commanded value; a line that leaves a panel is cut."""
 APART = 0.7
 """The room of all estimators at a rate, as a part of the distance of two rates."""
 

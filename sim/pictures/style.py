@@ -1,8 +1,8 @@
 """The style of all pictures: sizes of a page, fonts, colours of estimators, and files.
 
-A picture is `PAGE_IN` wide, for a page that shows it 700 pixels wide: its smallest letters are then as high as those of
-a footnote. The colours are those of Okabe and Ito and of Tol, which colour-blind people can distinguish; a marker
-repeats what the colour says. An estimator has the same colour and marker in every picture.
+A picture is `PAGE_IN` wide, for a page that shows it 700 pixels wide. Its smallest letters are then as high as a
+footnote's. The colours are from Okabe and Ito and from Tol: colour-blind people can distinguish them. A marker repeats
+the meaning of the colour. An estimator has the same colour and marker in every picture.
 """
 
 from collections.abc import Callable, Sequence
@@ -132,8 +132,8 @@ def lay_out(figure: Figure) -> None:
     """Give the panels of a figure their places, so that all that is written has room.
 
     This is the constrained layout with the places rounded. Its solver takes the equations in the order of the memory's
-    addresses, so that the last bits of its answer, and with them the names in an SVG, vary from run to run. A figure
-    does not own its layout, because it would then be laid out for each drawing, and be drawn twice to be saved.
+    addresses. So the last bits of its answer, and the names in an SVG, vary from run to run. A figure does not own its
+    layout, because it would then be laid out for each drawing, and be drawn twice to be saved.
     """
     ConstrainedLayoutEngine().execute(figure)
     for axes in figure.axes:

@@ -11,7 +11,7 @@ from ..walls import methods
 from .style import LABEL_PT, THEORY, ink, lay_out, looks, new_figure, page
 
 ROWS = 12
-"""The largest number of settings that are drawn: those that move the edge most."""
+"""The largest number of settings in the picture: the ones that move the edge most."""
 MOST = 4.0
 """The ratio of areas at which an interval is cut off that has no end, or a far one."""
 LEAST = 0.05

@@ -58,7 +58,7 @@ def npy_table(name: str, path: str | Path) -> Arrays:
 
 
 def _across(array: np.ndarray) -> np.ndarray:
-    """Return an array of one or two dimensions as its columns, those of two along its shorter side."""
+    """Return the columns of an array of one or two dimensions; with two, columns are counted along the shorter side."""
     if array.ndim == 1:
         return array[None, :]
     return array.T if array.shape[0] >= array.shape[1] else array
@@ -77,7 +77,7 @@ def table_of(name: str, form: str, found: dict[str, object]) -> Arrays:
 
 
 def columns_of(found: dict[str, object]) -> dict[str, np.ndarray]:
-    """Return the columns of named values, of which those that are arrays of numbers, times or texts have some."""
+    """Return the columns of named values. Arrays of numbers, times or texts have columns; other values have none."""
     columns = (pair for key, value in found.items() for pair in _columns(key, value))
     return dict(islice(columns, COLUMNS_MAX))
 

@@ -1,7 +1,7 @@
 """Captures of an encoder's pins by a logic analyser: the levels of channels A, B and Z, and when they change.
 
-The channels are those of `--channels`, by name or by number from 1 on, or those whose names end in the words A, B and
-Z (or I, or index), or the only two that there are, in their order. A leads B when the count goes up.
+The channels are given by `--channels`, by name or by number from 1 on. By default they are the ones whose names end in
+the words A, B and Z (or I, or index); or the only two, in their order. A leads B when the count goes up.
 """
 
 import re

@@ -1,7 +1,7 @@
 """Cells as counts: whole numbers, or angles and lengths that are multiples of the size of a count.
 
-A value in another unit than counts is divided by the size of a count after the first value is taken off, so that an
-origin that is no whole count does no harm. The quotient must be within `OFF_MAX` of a whole number.
+A value in another unit than counts is divided by the size of a count. The first value is subtracted before, so an
+origin between two counts does no harm. The quotient must be within `OFF_MAX` of a whole number.
 """
 
 import math
@@ -169,7 +169,7 @@ class Counts:
         return counts, said
 
     def _ask(self, values: np.ndarray) -> None:
-        """Raise RecordingError for a size that is not given, with the one that the values suggest."""
+        """Raise RecordingError for a missing size of a count; the message has the size that the values suggest."""
         steps = np.abs(np.diff(values))
         steps = steps[steps > 1e-9 * np.abs(values).max()]
         hint = ""

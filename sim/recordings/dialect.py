@@ -1,4 +1,4 @@
-"""What a text file looks like: its comments, its separator, its decimal comma, and whether a line names its columns.
+"""The form of a text file: its comments, its separator, its decimal comma, and whether a line names its columns.
 
 The rules, in this order:
 
@@ -7,11 +7,11 @@ The rules, in this order:
 - Separator. It is the first of tab, semicolon, comma and spaces that the first other line has, outside quotes. A comma
   that leaves two numbers beside each other in a cell is a decimal comma: then spaces separate.
 - Decimal comma. Where no comma separates, a cell `1,5` is the number 1.5.
-- Names. The first line names the columns if one of its cells is neither a number, nor a time, nor a word for nothing
-  such as `n/a`. A line that also has numbers is a row instead if one of them is a time or has a decimal point, or if
-  its other cells stand over texts alone. If the first line does not name the columns, the last comment before it does,
-  provided that it has as many cells, and one of them is no number.
-- A comment `Channels (2/8): A, B` of sigrok names the columns that a header calls `logic`, and a comment
+- Names. The first line names the columns if one of its cells is no number, no time, and no word for nothing
+  such as `n/a`. A line that also has numbers may be a row instead: if one of them is a time or has a decimal point, or
+  if its other cells stand over texts alone. If the first line does not name the columns, the last comment before it
+  may. It must have as many cells, and one of them must be no number.
+- A comment `Channels (2/8): A, B` of sigrok names the columns that a header calls `logic`. A comment
   `Samplerate: 1 MHz` or `Sample rate: 1e+06Hz` is the rate of rows without times.
 """
 
@@ -24,11 +24,11 @@ from .capture import hertz_of
 
 COMMENT = re.compile(r"\s*(?:#|%|//)")
 COMMENT_ABOVE = re.compile(r"\s*(?:#|%|//|; )")
-"""What a comment begins with, everywhere and above the first row."""
+"""The beginnings of a comment: everywhere, and above the first row."""
 NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)", re.IGNORECASE)
 ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:[.,]\d+)?)?(?:Z|[+-]\d\d:?\d\d)?")
 NOTHING = re.compile(r"[-?.*]+|n\.?/?a\.?|none|null|nil|missing", re.IGNORECASE)
-"""What programs write in place of a number that they do not have."""
+"""The texts that programs write in place of a missing number."""
 DECIMAL_COMMA = re.compile(r"\d,\d|(?:^|[\s;+-]),\d")
 _CHANNELS = re.compile(r"\W*channels?\s*\(\d+/\d+\)\s*:\s*(.+)", re.IGNORECASE)
 _RATE = re.compile(r"\W*sample ?rate\s*:\s*(.+)", re.IGNORECASE)
@@ -134,7 +134,7 @@ def dialect_of(lines: Sequence[str]) -> Dialect | None:
 
 
 def _separator(rows: list[str]) -> str:
-    """Return the separator of the first rows, the first of which may name the columns."""
+    """Return the separator of the first rows; the very first may name the columns."""
     # Spaces behind another separator are no separators of their own.
     bare = re.sub(r"([,;])[ \t]+", r"\1", re.sub(r'"[^"]*"', "q", rows[0]).strip())
     found = next((mark for mark in "\t;," if mark in bare), None)

@@ -17,7 +17,7 @@ ACCEPTED = (
 
 
 class RecordingError(ValueError):
-    """A recording that is refused: one line that names the file, the place in it, and what is accepted."""
+    """A recording is refused. The message is one line: the file, the place in it, and the accepted values."""
 
 
 def plain(text: str) -> str:
@@ -41,4 +41,4 @@ DAMAGED = (
     *(OSError, ValueError, TypeError, RuntimeError, EOFError, LookupError, ArithmeticError, AttributeError),
     *(zipfile.BadZipFile, zlib.error, struct.error),
 )
-"""What libraries raise for a file that is damaged: hardly any of them has an error of its own for it."""
+"""The errors that libraries raise for a damaged file: hardly any library has its own error for it."""

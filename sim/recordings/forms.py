@@ -63,4 +63,4 @@ FORMS: dict[bytes, Callable[[str, str | Path], Table | Capture]] = {
     b"MATLAB 7": matlab_table,
     b"PAR1": Parquet,
 }
-"""What reads a file, by how it begins."""
+"""The reader of a file, by the file's first bytes."""

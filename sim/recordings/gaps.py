@@ -4,7 +4,7 @@ An interval that is nearer to two usual ones, or more, than to one is a gap; wha
 missing as bring the pieces on either side into one line, each by the mean of its times. Stamps that are rounded to a
 unit give intervals of two lengths, one unit apart. So an interval that is longer by less than `UNITS` units is a gap
 only if the rate that is given says so; without a rate, unless there are `MANY` of them, spread as evenly as rounding
-does. A sample is repeated if its time and its count are those of the sample before. The rules:
+does. A sample is repeated if it has the time and the count of the sample before. The rules:
 
 - `refuse`: either is an error.
 - `hold`: a gap is filled with the count before it, as a controller sees it; repeated samples are taken out.
@@ -87,7 +87,7 @@ def _whole(steps: np.ndarray, lacking: np.ndarray, rate_hz: float | None) -> np.
 
 
 def _fits(steps: np.ndarray, passed: np.ndarray, unit: float, rate_hz: float | None) -> bool:
-    """Return whether all times are within a unit of those of a rate, or of the line from the first to the last."""
+    """Return whether all times are within a unit of the times of a rate, or of the line from the first to the last."""
     since, numbers = np.cumsum(steps), np.cumsum(passed)
     interval = since[-1] / numbers[-1] if rate_hz is None else 1 / rate_hz
     return bool((np.abs(since - numbers * interval) < unit * (1 - 1e-6)).all())
@@ -118,7 +118,7 @@ def grid_of(name: str, times: Times, counts: np.ndarray, rule: str, rate_hz: flo
     passed = passed_in(steps, times.resolution, rate_hz)
     if passed.sum() >= SAMPLES_MAX:
         raise RecordingError(
-            f"{name}: must have at most {SAMPLES_MAX} samples with those that are missing, not {passed.sum() + 1:.0f}: "
+            f"{name}: must have at most {SAMPLES_MAX} samples, missing ones included, not {passed.sum() + 1:.0f}: "
             "give --gaps split"
         )
     numbers = np.concatenate([[0], np.cumsum(passed.astype(np.int64))])

@@ -70,8 +70,8 @@ class _Counted:
         reading.refuse(table.name, "is read as counts (--column)", "channels")
         if self._time is None:
             reading.refuse(table.name, "is read without times", "time_unit")
-        # The times of a column that was not asked for only have to agree with a rate that is given, unless they are to
-        # tell where samples are missing.
+        # If nobody asked for a column of times, its times only have to agree with a given rate, unless they must tell
+        # where samples are missing.
         asked = reading.gaps != "refuse" or (self._time is not None and self._time.meant)
         self._loose = rate_hz is not None and self._time is not None and not asked
         if self._time is None and rate_hz is None:

@@ -98,7 +98,7 @@ class LogicTable(Capture):
         return now
 
     def _timed(self, stamps: Stamps, levels: np.ndarray, start: int) -> Changes:
-        """Return the changes with their times; the first time is that of the first row, the last of the last."""
+        """Return the changes with their times; the first and the last time are the first and the last row's."""
         times, where = stamps.whole(), place_of(self.name, self._time.name)
         stamps.check_unit(self._given)
         unit = stamps.unit if stamps.unit != "iso" else "s"

@@ -1,8 +1,8 @@
 """The times of samples as a file gives them, exactly: decimal numbers, the float64 of an array, or ISO timestamps.
 
-A decimal time is kept as a whole number and a power of ten, so differences of times have no rounding but their last.
-A text of 17 or more digits that is the value of a float64, rounded, was printed in full; it counts as the shortest
-decimal of that float64. Other texts keep all the digits that int64 holds.
+A decimal time is kept as a whole number and a power of ten, so differences of times have no rounding but their last. A
+text of 17 or more digits that is a rounded float64 was printed in full. It counts as the shortest decimal of that
+float64. Other texts keep all the digits that int64 holds.
 """
 
 import math
@@ -24,7 +24,7 @@ UNITS = {"s": 0, "ms": -3, "us": -6, "ns": -9}
 TIME_MAX_S, TIME_MAX = 1e12, 9e18
 """The largest time stamp, either way: tens of thousands of years, and what int64 has, which is less in nanoseconds."""
 DIGITS_MAX, DIGITS_OF_FLOAT = 19, 17
-"""The most digits of a whole number in int64, and those that tell every float64 apart."""
+"""The most digits of a whole number in int64, and the digits that distinguish every float64."""
 LEAST_POWER = -400
 """The least power of ten of a time: what is smaller is 0, as in float64."""
 
@@ -152,7 +152,7 @@ class Stamps:
         )
 
     def check_unit(self, given: str | None) -> None:
-        """Raise RecordingError if times that have a unit of their own, those of NumPy, are to have another one."""
+        """Raise RecordingError if another unit is given for times that have their own unit (NumPy's)."""
         if given is not None and self.unit != given:
             where = f"{self._table.name}, column {plain(self._column)}"
             raise RecordingError(f"{where}: its times have a unit, so --time-unit must be absent, not {given}")
@@ -185,7 +185,8 @@ class Times:
 
     @property
     def rounding(self) -> float:
-        """How exact times can be in floating point: their spacing, that of float64, or 1e-12 of the whole time."""
+        """The precision of times in floating point: their own spacing, the spacing of float64, or 1e-12 of the whole
+        time."""
         largest = max(abs(float(self.first)), abs(float(self.last)))
         return max(self.spacing, float(np.spacing(largest)), 1e-12 * float(self.since[-1]))
 
@@ -203,7 +204,7 @@ class Times:
         return Times(since, decimals, self.first.scaleb(power), self.last.scaleb(power), spacing)
 
     def some(self, rows: np.ndarray | slice) -> "Times":
-        """Return the times of some samples, in their order, the first of which stays the origin of `since`."""
+        """Return the times of some samples, in their order; the first one stays the origin of `since`."""
         since = self.since[rows]
         if len(since) == len(self.since):
             return self

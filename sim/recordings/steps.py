@@ -1,4 +1,4 @@
-"""The steps of recorded counts: a counter that wrapped is unwrapped, and a step that is no motion is refused.
+"""The steps of recorded counts: wraps of a counter are undone, and steps that are no motion are refused.
 
 A handle does not reach a speed and lose it again within one sample. So a step is held against the `BESIDE` steps on
 either side of it. With the median of these and their spread, the largest less the smallest, a step is no motion if
@@ -10,16 +10,16 @@ recording, where one side is missing, the largest of the other steps stands for 
 two opposite steps, which do not support each other. Where samples are missing, a step may be any.
 
 The range of the counter. If its width is given, every step is taken modulo its range. If it is not, steps are taken
-modulo 2**`SPAN_BITS`; where that leaves a step that is no motion, or a step over missing samples that is faster than
-all others, the range may be smaller. It is then one turn, where the values are angles and span no more, or else the
-least power of two that holds all counts, of 8 to 31 bits, provided that
+modulo 2**`SPAN_BITS`. The range may be smaller if this leaves a step that is no motion, or the fastest step is over
+missing samples. For angles that span no more it is then one turn. For others it is the least power of two that holds
+all counts, 8 to 31 bits, provided that
 
-- every step across the end of the range, once unwrapped, differs from the median of the steps beside it by no more than
-  their spread, or `CLOSE` of the smallest steps; over missing samples, it is no faster than the other steps; and
+- every step across the end of the range, once unwrapped, is close to the median of its neighbours: within their spread,
+  or `CLOSE` of the smallest steps; over missing samples it is no faster than the other steps; and
 - no step is longer than a quarter of the range, so that its direction is beyond doubt.
 
-A file that does not meet both has another fault than a counter that wrapped, and is refused. Of a width that is given,
-a step across the end may differ by `JUMP` times the spread.
+If a file does not meet both, its fault is no wrapped counter, and it is refused. Of a width that is given, a step
+across the end may differ by `JUMP` times the spread.
 """
 
 from collections.abc import Iterator, Sequence
@@ -38,7 +38,7 @@ JUMP, FLOOR = 4, 8
 CLOSE = 2
 """How many smallest steps a step across the end of a range may be off."""
 WRAP_BITS = range(8, SPAN_BITS)
-"""The widths of counters that are found, and that a message knows."""
+"""The counter widths that are found, and suggested in messages."""
 COUNTER_BITS = 8, 64
 """The widths of counters that can be given."""
 LARGEST = 1 << 61
@@ -50,7 +50,7 @@ class Unwrapped(NamedTuple):
 
     Attributes:
         counts: the counts, int64.
-        cuts: the samples that a sensor that stood jumps to.
+        cuts: the samples to which a stuck sensor jumps.
         notes: what was understood.
     """
 
@@ -151,7 +151,7 @@ class Steps:
         return not self._misfits(within, wraps, 1).size
 
     def _misfits(self, within: np.ndarray, wraps: np.ndarray, spreads: int) -> np.ndarray:
-        """Return the steps across the end of a range which differ from those beside them by more than so many spreads,
+        """Return the steps across the end of a range that differ from their neighbours: by more than so many spreads,
         and `CLOSE` of the smallest steps."""
         places = np.flatnonzero(wraps & ~self._gaps)
         if len(within) <= 2 * BESIDE or not len(places):
@@ -161,7 +161,7 @@ class Steps:
         return places[np.abs(within[places] - usual) > near]
 
     def _check_width(self, bits: int, steps: np.ndarray, wraps: np.ndarray) -> None:
-        """Raise RecordingError if a width that is given makes steps across the end of its range that do not fit."""
+        """Raise RecordingError if a given width makes misfitting steps across the end of its range."""
         wrong = self._misfits(steps, wraps, JUMP)
         if len(wrong):
             usual, _ = _around(steps, wrong[:1])
@@ -182,7 +182,7 @@ class Steps:
         return self._gaps & (np.abs(steps) > self._passed * np.abs(steps[~self._gaps]).max())
 
     def _check(self, steps: np.ndarray, may_stand: bool) -> np.ndarray:
-        """Return the samples that a sensor that stood jumps to; raise RecordingError if another step is no motion."""
+        """Return the samples to which a stuck sensor jumps; raise RecordingError if another step is no motion."""
         cuts, held = [], _held(steps)
         for place, usual, spread in _jumps(steps, self._gaps):
             if may_stand and held[place] > BESIDE:
@@ -196,7 +196,7 @@ class Steps:
         return np.array(cuts, np.int64)
 
     def _cure(self, steps: np.ndarray, place: int, off: float, spread: float, held: int) -> str:
-        """Return what has probably happened at a step that is `off` by so much, and what helps."""
+        """Return the probable cause of a step that is `off` by so much, and the remedy."""
         count, cut, least = int(self._counts[place + 1]), "cut the recording at this line", _smallest(steps)
         close = max(spread, CLOSE * least)
         if self._turn is not None and abs(abs(off) - self._turn) <= close:

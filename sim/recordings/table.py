@@ -1,4 +1,4 @@
-"""A file as a table: named columns, which are read in chunks of rows, so that no file is in memory as a whole."""
+"""A file as a table: named columns, read in chunks of rows, so that no whole file is in memory."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
@@ -91,7 +91,7 @@ class Table(ABC):
 
 
 class Arrays(Table):
-    """A table of columns that are in memory, of files that hold arrays."""
+    """A table of columns in memory, for files with arrays."""
 
     word = "row"
 

@@ -1,11 +1,12 @@
-"""Which column of a file tells of time, and in which unit.
+"""The column of a file with the times, and its unit.
 
-The column is `--time`, or `NAME.time` for counts in a column `NAME`, or `time_s`, or the first whose name is one of
-`t`, `time`, `timestamp`, `stamp`, `clock` and `elapsed`, with a unit behind it or without, or a unit alone, such as
-`seconds`. A file without names has none but `--time`.
+The column is `--time`, or `NAME.time` for counts in a column `NAME`, or `time_s`. Else it is the first one with one of
+these names: `t`, `time`, `timestamp`, `stamp`, `clock` and `elapsed`, with or without a unit at the end; or a unit
+alone, such as `seconds`. A file without names has none but `--time`.
 
-The unit is `--time-unit`, or that of the name. Without either, timestamps are ISO, and numbers have the unit that alone
-of `s`, `ms`, `us` and `ns` makes their rate one of `USUAL_HZ`, the rates of logs.
+The unit is `--time-unit`, or the one in the name. Without either, timestamps are ISO.
+Numbers then get their unit from their rate: only one of `s`, `ms`, `us` and `ns` makes it one of `USUAL_HZ`, the rates
+of logs.
 """
 
 import re
@@ -91,7 +92,7 @@ def time_column_of(table: Table, reading: Reading, other_than: set[int]) -> Time
 
 
 def unit_by_rate(where: str, mean: float) -> str:
-    """Return the unit of numbers that are so far apart, by the rates that it makes.
+    """Return the unit of times with this spacing, by the rate that it would give.
 
     Args:
         where: the file and the column, for a message.

@@ -15,9 +15,9 @@ half an interval on either side: it shows where the interval is 2 units or more.
 is given, all intervals must be printed alike.
 
 Whole numbers that are 1 or more apart in a column `time_s` may be seconds, or milliseconds, microseconds or
-nanoseconds: a rate or `--time-unit` must be given with them. A rate that is given with a column of another name, which
-was not asked for, must be its mean rate, within `MEAN`. The rate of floating-point times is the roundest number within
-their resolution.
+nanoseconds: a rate or `--time-unit` must be given with them. If a rate is given beside a column of times that nobody
+asked for, the rate must be the column's mean rate, within `MEAN`. The rate of floating-point times is the roundest
+number within their resolution.
 """
 
 from collections.abc import Sequence
@@ -125,7 +125,7 @@ class Sampled:
             )
 
     def _twice(self) -> str:
-        """Return what helps against a time that is there twice."""
+        """Return the remedy for a repeated time."""
         zero = bool((self._steps == 0).any())
         return ", or take repeated samples out (--gaps hold)" if zero else ""
 
@@ -160,7 +160,7 @@ class Sampled:
         )
 
     def _cure(self, rate_hz: float, given: bool) -> str:
-        """Return what helps against intervals that are not those of a rate."""
+        """Return the remedy for intervals that do not fit a rate."""
         unit, steps = self._times.resolution, self._steps / np.diff(self._numbers)
         if (passed_in(steps, unit, rate_hz if given else None) > 1).any():
             return (
@@ -171,7 +171,7 @@ class Sampled:
         if abs(mean_s * rate_hz - 1) > MEAN:
             return "correct the rate"
         if mean_s < 2 * unit and not given:
-            return f"give the rate (--rate {rate_hz:.6g}), for stamps as coarse as these do not tell it"
+            return f"give the rate (--rate {rate_hz:.6g}), because such coarse stamps do not give it"
         return f"if only the stamps jitter, give --time none --rate {rate_hz:.6g}, or write them evenly"
 
 

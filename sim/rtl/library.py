@@ -28,7 +28,7 @@ def shown_by(spec: AxisSpec) -> tuple[str, ...]:
 
 
 def resting_of(spec: AxisSpec) -> Resting:
-    """Return what may run in an axis while all else rests, and how to tell that it does.
+    """Return the counters that may run in an axis while the rest rests, and the test for this rest.
 
     Raises:
         RestsNotError: if none of its clocks may be skipped.
@@ -103,7 +103,7 @@ endmodule
 
 @dataclass(frozen=True)
 class _Sources:
-    """What a library is made of: its files, and why none of its clocks can be skipped, if that is so."""
+    """The parts of a library: its files, and the reason if none of its clocks can be skipped."""
 
     files: dict[str, str]
     why_not: str = ""
@@ -130,7 +130,7 @@ def build(spec: AxisSpec, traced: bool = False, short: bool = False) -> Path:
 
     Args:
         spec: the axis.
-        traced: include the code that records waveforms, of every clock, which is slower.
+        traced: include the code that records waveforms of every clock; it is slower.
         short: build quickly, for a run so short that building takes most of the time.
 
     Raises:

@@ -16,7 +16,8 @@ OPTION: dict[Memory, str] = {"sram": "--write-sram", "flash": "--write-flash"}
 def load(board: Description, bitstream: Path, memory: Memory, sha256: str) -> None:
     """Put a bitstream into a board: into the part, until the supply goes, or into the flash that it is loaded from.
 
-    The loader gets a copy, whose digest is checked: what is in the board is what was built, whoever writes to the file.
+    The loader gets a copy with a checked digest. So the board gets exactly the built bitstream, whoever else writes to
+    the file.
 
     Raises:
         SynthesisError: if the bitstream has another digest than `sha256`, there is no loader, or it fails, as it does

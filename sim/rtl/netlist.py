@@ -20,8 +20,9 @@ RTL, GATES = "rtl", "gates"
 OPTIONS = (
     # The files of cells that a family needs are named; they include no others.
     "-DNO_INCLUDES",
-    # iCE40's models give values to inputs that are left open. Verilator, for which a cell's input and the net at it are
-    # one variable, gives them to that net at the first evaluation, up to the pins of the top. Open inputs are 0 here.
+    # iCE40's models give values to inputs that are left open. For Verilator, a cell's input and the net at it are one
+    # variable. It gives the values to that net at the first evaluation, up to the pins of the top. Open inputs are 0
+    # here.
     "-DNO_ICE40_DEFAULT_ASSIGNMENTS",
     # Yosys leaves out pins that a mode has no use for. Its models name no generate blocks, few have a time scale, and
     # they have delays and parameters that mean nothing here. A name may have lost bits that nothing needs.

@@ -1,6 +1,6 @@
 """Size and speed of several axes through one pipeline, placed and routed alone, without pins.
 
-What a link and drive stages take is not in it, so that there may be more axes than a board has pins for.
+A link and drive stages are left out, so that there may be more axes than a board has pins for.
 """
 
 import shutil

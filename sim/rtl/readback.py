@@ -1,8 +1,8 @@
-"""What a packer wrote, read back and held against what nextpnr has placed and routed.
+"""The readback of a bitstream, compared with the placed and routed design of nextpnr.
 
 Of an iCE40 every bit of every tile is compared. The unpackers of the others write a configuration in other words than
-nextpnr does, for a default may be said or left out. Of these it is the part, the contents of every logic cell that has
-a function, by its place, and the switches of the wires; and of an ECP5 all memories.
+nextpnr does: a default may be written or left out. Of these it is the part, the contents of every logic cell that has a
+function, by its place, and the switches of the wires; and of an ECP5 all memories.
 """
 
 import json
@@ -14,14 +14,14 @@ from ..boards.description import Description
 from .tools import SynthesisError
 
 Facts = dict[str, str]
-"""What is compared, by name or place."""
+"""The compared facts, by name or place."""
 CONSTANT = {"0" * 16, "1" * 16}
 """Contents of a logic cell without a function: a cell that is not used has one of these."""
 UNTOLD_ECP5 = re.compile(
     r"\w+_SLICE|\w+_PIO|\w*(BOUNCE|JMUIA\d+|JPADDI|JREFCLK\d_\d|(BNK_|G_J|SYNC)ECLK\d|CLKINTFB|DDRDEL)"
 )
-"""Sources of wires of an ECP5 that are not compared. They have no bits, for they are connected unless another one is;
-but for outputs of logic cells, some of whose bits their mode sets, too, and edge clocks, which are not used."""
+"""Sources of wires of an ECP5 that are not compared. They have no bits: they are connected unless another wire is.
+Exceptions are outputs of logic cells, some of whose bits their mode sets too, and edge clocks, which are not used."""
 UNTOLD_GOWIN = re.compile(r"XD\d|GT00")
 """Wires of a Gowin that cannot be told: from a logic cell to its flip-flop there is no switch, and where clocks are
 tapped, four spines have the same bits."""
@@ -35,7 +35,7 @@ WIRE = "wire "
 
 
 def check(board: Description, routed: Path, unpacked: Path, bitstream: Path) -> int:
-    """Compare what was placed and routed with what a bitstream has; return the number of facts that are the same.
+    """Compare the placed and routed design with the bitstream's content; return the number of equal facts.
 
     Args:
         board: the board.
@@ -127,7 +127,7 @@ def _routed_json(path: Path) -> Facts:
 
 
 def wire_of(row: int, column: int, wire: str) -> str:
-    """Return the unpacker's name of a wire of a Gowin at a place: one that leads there has that of where it begins.
+    """Return the unpacker's name of a Gowin wire at a place; a wire that leads there is named after its beginning.
 
     Args:
         row, column: the place, from 1 on.

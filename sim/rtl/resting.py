@@ -1,36 +1,36 @@
-"""What may run while all else of a component rests: a check of its netlist, which allows a simulation to skip clocks.
+"""Counters that run while the rest of a component rests: a check of its netlist, so that a simulation skips clocks.
 
 Between two samples an axis does nothing but count clocks. A simulation that knows so may leave these clocks out, and
-add their number to the counters. `check` finds in Amaranth's netlist, the one that the Verilog is written from, whether
-that is so for the registers that `COUNTERS` names, and at which of their values anything else sees them, their stops.
+add their number to the counters. `check` examines Amaranth's netlist, from which the Verilog is written. It finds
+whether this holds for the registers in `COUNTERS`, and their stops: the values at which anything else sees them.
 
 **What is checked.** A counter reaches the rest of the component through nothing but
 
 - comparisons with a constant, its stops: the bit of such a comparison may go anywhere;
-- the data of registers behind decisions (multiplexers, assignments under a condition) that are not the counter's, as a
-  word in which its lowest bit stands as it is: the latch of a stamp.
+- the data of registers behind decisions that are not the counter's (multiplexers, assignments under a condition), as a
+  word with its unchanged lowest bit: the latch of a stamp.
 
 Its own next value is, behind such decisions again, its successor, itself, or what is not made of counters. What is
 `shown` is not made of counters, and all registers have one clock and no asynchronous reset.
 
-**Why that is enough.** Let the inputs be constant, and let two clocks in a row leave every register and memory as it
-was, but for the counters, which are one further after each; and let no counter be at a stop before, between or after
-the two. All that decides then depends on what has not changed, so in both clocks every register takes its value by the
+**Why that is enough.** Let the inputs be constant. Let two clocks in a row leave every register and memory as it was,
+except the counters, which are one further after each clock. Let no counter be at a stop before, between or after the
+two clocks. Every decision then depends on unchanged values. So in both clocks every register takes its value by the
 same way. It cannot be the way from a counter: the counter's lowest bit differs in the two clocks, and the register
-would, too. So what a register takes is made of what has not changed. And a counter goes by the way of its successor,
-for by any other it would not be one further after each clock. The third clock begins as the second did, but for the
-counters, so it goes the same ways; and so does every clock up to one with a counter at a stop, or with other inputs.
+would, too. So a register's new value is made of unchanged values. And a counter takes its successor: by any other way
+it would not be one further after each clock. Then the third clock begins like the second, except for the counters, so
+it takes the same paths. So does every clock up to one with a counter at a stop, or with other inputs.
 
-**When one clock is enough.** Where no register that the shown outputs follow from takes a counter by any way, and a
-counter's own next value is its successor, itself or a constant, one clock tells as much as two. What leaves such a
-register as it was does so in the next clock, too; and a counter that is one further went by the way of its successor,
-unless the constant is just that: the value below a constant is a stop, besides. Other registers need not rest, for
-nothing that is looked at follows from them.
+**When one clock is enough.** One clock is enough instead of two under two conditions. No register that leads to the
+shown outputs takes a counter by any way. And a counter's own next value is its successor, itself or a constant. If such
+a register stays as it was, it stays so in the next clock, too. A counter that is one further has taken its successor,
+unless the constant is just that value: so the value below a constant is a stop, too. Other registers need not rest,
+because no examined output follows from them.
 
-A simulation has to see these clocks each time; what it then skips is exact. If the check fails, nothing is skipped.
-It may keep more than registers from clock to clock, as Verilator does: what follows from them. All of that is compared;
-what follows from a counter is its successor, which differs from clock to clock, or the bit of a stop, which is the same
-at both ends of what is skipped.
+A simulation has to see these clocks each time; what it then skips is exact. If the check fails, nothing is skipped. It
+may keep more than registers from clock to clock, as Verilator does: what follows from them. All of this is compared.
+Two values follow from a counter. Its successor differs from clock to clock. The bit of a stop is the same at both ends
+of the skipped clocks.
 """
 
 from collections.abc import Iterable
@@ -39,11 +39,11 @@ from dataclasses import dataclass
 from amaranth.hdl import _nir as nir
 
 COUNTERS = ("divider", "decoder.seen__stamp")
-"""The registers that may run: what tells an axis when to sample, and the number of the clock."""
+"""The registers that may run: the timer of an axis's samples, and the number of the clock."""
 
 
 class RestsNotError(ValueError):
-    """A component whose clocks cannot be skipped; one line that says what is in the way."""
+    """A component's clocks cannot be skipped; the one line of the message names the obstacle."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Counter:
     """A register that may run while all else rests.
 
     Attributes:
-        names: all its names, those of the modules below the top first, with dots between.
+        names: all its names, joined by dots; the names of the modules below the top come first.
         width: its bits; it wraps.
         stops: its values at which anything else sees it.
     """
@@ -67,7 +67,7 @@ class Resting:
 
     Attributes:
         counters: what may run while all else rests.
-        clocks: the clocks in a row in which nothing but the counters may change, to tell that it rests.
+        clocks: the number of successive clocks in which only the counters may change; the component then rests.
     """
 
     counters: tuple[Counter, ...]
@@ -75,12 +75,12 @@ class Resting:
 
 
 def check(netlist: nir.Netlist, shown: Iterable[str], listed: Iterable[str] = COUNTERS) -> Resting:
-    """Return the counters of a component that may run while all else rests, and how to tell that it does.
+    """Return the counters of a component that may run while the rest rests, and the test for this rest.
 
     Args:
         netlist: the component, from `hdl.export.to_netlist`.
         shown: the outputs that are looked at while clocks are skipped.
-        listed: names of the counters; those that it does not have are left out.
+        listed: names of the counters; missing ones are left out.
 
     Raises:
         RestsNotError: if a counter reaches what it must not.

@@ -30,10 +30,10 @@ FAST_TO_RUN, FAST_TO_BUILD = "-O3", "-O1"
 
 @dataclass(frozen=True)
 class Recipe:
-    """What a shared library is made of.
+    """The parts of a shared library.
 
     Attributes:
-        files: the sources by file name; those that end in .v are the hardware.
+        files: the sources by file name; files ending in .v are the hardware.
         shim: the name of the C++ file with the library's functions.
         prefix: the name of the class that Verilator makes.
         options: options of Verilator beside `OPTIONS`.

@@ -17,11 +17,11 @@ from .bitstream import pages
 from .flow import around
 
 WAIVERS = Path(__file__).with_name("lint.vlt")
-"""What `verilator -Wall` finds in the style of the Verilog, and why it is waived."""
+"""The style warnings of `verilator -Wall` on the Verilog, and why they are waived."""
 VERILOG = {".v", ".sv"}
 """How the names of Verilog end, in small letters."""
 LONGEST = 1000
-"""The most letters of a file that are read to know what it is."""
+"""The most characters of a file that are read to identify it."""
 
 
 class OtherTopError(InputError):
@@ -60,7 +60,7 @@ def write_verilog(spec: AxisSpec | AxesSpec, folder: Path, beside: Mapping[str, 
 
 
 def _check_tops(folder: Path, spec: AxisSpec | AxesSpec, replaced: set[str]) -> None:
-    """Raise OtherTopError if a folder has a `top` for another clock or drive than those of `board.v`, and it stays."""
+    """Raise OtherTopError if a folder keeps a `top` for another clock or drive than `board.v` has."""
     drive = drive_of_axes(spec.axes) if isinstance(spec, AxesSpec) else spec.stage.name
     for path in sorted(path for path in folder.iterdir() if path.suffix.lower() in VERILOG and path.is_file()):
         with path.open(encoding="utf-8", errors="replace") as file:

@@ -97,7 +97,7 @@ def synthesise(
         glitch_clocks: the decoder's glitch filter, which is part of the latency.
 
     Returns:
-        What `summary` returns; `folder` is that of netlist, logs and reports.
+        The result of `summary`; `folder` has the netlist, logs and reports.
 
     Raises:
         ValueError: if there is no such part, or no seed, or the part's board has no pins for so many axes.
@@ -125,9 +125,9 @@ def summary(design: Design, runs: Sequence[Placed], glitch_clocks: int) -> dict:
         untimed: types of cells in use whose delays are not known; the paths of these are not in fmax.
         clocks_per_sample, interval_clocks: the fewest clocks from a sample to the next; max_sample_hz: the sample rate
             that follows at fmax_mhz, of each axis if there are several.
-        latency_clocks: clock edges from the first that sees a pin changed to the one that changes the drive that the
-            supervisor lets out, both included, if the sample is taken as soon as the decoder has counted the edge;
-            pin_to_force_ns: the longest time that follows at fmax_mhz, for the pin may change just behind an edge.
+        latency_clocks: clock edges from the first that sees a changed pin to the change of the supervisor's drive, both
+            included; the sample is taken as soon as the decoder has counted the edge; pin_to_force_ns: the longest time
+            that follows at fmax_mhz, because the pin may change just after an edge.
         critical_path: the longest path with the slowest seed.
         axes: how many axes there are, of several.
     """

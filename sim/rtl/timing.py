@@ -1,4 +1,4 @@
-"""Speed and size of what nextpnr has placed and routed, with the delay that it does not know.
+"""Speed and size of a placed and routed design, with the delay that nextpnr does not know.
 
 It times the iCE40's multiplier block as if it had registers. A block used without them is part of a path: from the last
 register before it, through it, to the first behind it.
@@ -25,7 +25,8 @@ def _signal(step: dict) -> str:
 
 def timing(part: Part, report: dict) -> tuple[float, str]:
     """Return a report's longest delay between registers, in ns, and the two ends of its path."""
-    # The oscillator is a clock too; a net of the pin `clk` has its name, or that of a port of the same name inside.
+    # The oscillator is a clock, too. A net of the pin `clk` has its name, or the name of an inner port of the same
+    # name.
     clock, fmax = next((name, fmax) for name, fmax in report["fmax"].items() if re.search(r"(^|[$.])clk($|\$)", name))
     longest = 1e3 / fmax["achieved"]
     paths = report["critical_paths"]

@@ -1,4 +1,4 @@
-"""The tools that make a bitstream, from the Python package index, and the one that loads it."""
+"""The tools that make a bitstream, and the tool that loads it, all from the Python package index."""
 
 import os
 import re
@@ -40,7 +40,7 @@ def run(work: Path, log: Path, command: Sequence[str], doing: str) -> None:
     tool = shutil.which(command[0], path=os.pathsep.join([str(TOOLS), os.environ.get("PATH", "")]))
     if tool is None:
         raise SynthesisError(absent(command[0], "synth"))
-    # What a tool leaves when it is ended goes with the folder that it works in.
+    # An ended tool's leftovers go with its working folder.
     temporary = work / "tmp"
     temporary.mkdir(exist_ok=True)
     environ = os.environ | home_for_tools() | {"TMPDIR": str(temporary.absolute())}

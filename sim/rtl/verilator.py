@@ -13,17 +13,17 @@ from ...model.runtime.build_folder import build_dir, folder_of_tools, home_for_t
 from ..jobs import children
 
 LINT_OPTIONS = ["-Wall", str(Path(__file__).with_name("lint.vlt"))]
-"""Every warning, but for those that `lint.vlt` waives, with the reason of each."""
+"""Every warning, except the ones that `lint.vlt` waives with a reason."""
 
 
 NEEDED = {"c++": "g++", "make": "make", "perl": "perl"}
-"""The tools of the system that a build needs, each with the package of Debian and Ubuntu that has it."""
+"""The system's tools that a build needs, each with its package in Debian and Ubuntu."""
 MODULES_OF_PERL = "-MFindBin", "-MPod::Usage"
 """The modules that Verilator's own script loads: Debian's perl-base is a `perl` without them."""
 
 
 READ_BY_TOOLS = frozenset("$:#%;&|<>()[]{}*?!~^`'\"\\")
-"""What make, the shell or ccache reads in a path as something else than a letter; so they do every kind of space."""
+"""Characters of a path with a meaning to make, the shell or ccache; every kind of space has one, too."""
 
 
 class BuildError(RuntimeError):
@@ -58,7 +58,7 @@ def check_paths(build: Path) -> None:
 
 
 def environment() -> dict[str, str]:
-    """Return a copy of the environment in which `verilator` is the one installed beside this project."""
+    """Return a copy of the environment with the `verilator` installed beside this project."""
     root = Path(verilator.__file__).parent
     path = os.pathsep.join([str(root / "bin"), os.environ.get("PATH", "")])
     # Verilator's makefiles call `python`, which Debian need not have, and name its folder with letters beyond ASCII

@@ -1,4 +1,4 @@
-"""Waveforms: the VCD that Verilator writes, as the compact FST that GTKWave and Surfer open.
+"""Waveforms: Verilator's VCD, converted to the compact FST for GTKWave and Surfer.
 
 Verilator writes one declaration or change a line, so the VCD is read line by line. Signals with a name that Yosys had
 to invent (it begins with `$`) mean nothing to a reader and are left out.

@@ -15,7 +15,7 @@ __all__ = ["SceneError", "spec"]
 
 
 def spec(scene: str | Path) -> AxisSpec:
-    """Return the specification of the axis of a scene: that of its Verilog, gains included.
+    """Return the specification of the axis of a scene, as its Verilog has it, gains included.
 
         spec("mhz")         # as `hardwall verilog mhz` generates it
 
@@ -24,8 +24,8 @@ def spec(scene: str | Path) -> AxisSpec:
 
     Raises:
         TypeError: if the scene is neither a name nor a path.
-        SceneError: if the scene is not valid, or has several axes; the message is one line on what is wrong, where, and
-            what is accepted.
+        SceneError: if the scene is not valid, or has several axes; the message is one line: the fault, its place, and
+            the accepted values.
     """
     if not isinstance(scene, str | Path):
         raise TypeError(f"scene must be a name or a path, not {shown(scene)}")

@@ -83,7 +83,7 @@ def _converter(scene: Scene) -> Converter | None:
 
 
 def output_step_n(scene: Scene) -> float:
-    """Return the change of a command (N) that surely changes the output; 0 without a section that has steps."""
+    """Return the change of a command (N) that surely changes the output; 0 without steps in the output."""
     output = scene.output
     if scene.drive is not None:
         return scene.spec.drive.step_n
@@ -140,7 +140,7 @@ def tool_of(scene: Scene, backend: str) -> Tool:
     position, surface = words["wall_position"], words["wall_velocity"]
     exact = is_exact(backend)
     estimate = spec.design.estimator.velocity.lsb if exact else 1.0
-    # What acts on the tool is what acts on the handle: the words' values, where the axis has words.
+    # The tool feels the same values as the handle: the words' values, if the axis has words.
     gains = {"wall_stiffness": coupling.stiffness_n_per_m, "wall_damping": coupling.damping_n_s_per_m}
     if exact:
         gains = {name: words[name].to_si(scene.words[name]) for name in gains}
@@ -167,9 +167,9 @@ def tool_of(scene: Scene, backend: str) -> Tool:
 def sweep_of(scene: Scene, world: World, controller: object) -> Sweep | None:
     """Return what the loop needs to sweep over samples; None if it cannot: see `sim.loop.sweep`.
 
-    Only a model can be given a count, a rigid handle alone has a motion of one sign, the estimator must not look at
-    stamps, and the pins must be those of the handle's place. The edges before a changed drive must be counted at the
-    strobe after the next.
+    Four conditions hold: only a model can be given a count; only a rigid handle has a motion of one sign; the estimator
+    must not use stamps; and the pins must follow the handle's place. The edges before a changed drive must be counted
+    at the strobe after the next.
     """
     spec, timing = scene.spec, world.timing
     if not isinstance(controller, Controller) or not isinstance(world.plant, Rigid):
@@ -179,8 +179,8 @@ def sweep_of(scene: Scene, world: World, controller: object) -> Sweep | None:
     latency = quadrature.latency(controller.glitch_clocks)
     clocks = timing.clocks_per_sample - timing.latency - latency
     closest_m = scene.encoder.closest_counts * spec.count_m
-    # An edge that is decoded before the next one has been seen is the only one under way; and edge by edge, a sample
-    # would not have so many that some are lost.
+    # If each edge is decoded before the next one is seen, only one edge is under way. Edge by edge, a sample would not
+    # have so many that some are lost.
     apart_s = max((latency + 1) / spec.clock_hz, 4 / EDGE_CAPACITY / spec.sample_hz)
     least, most = spec.count_m * spec.sample_hz, closest_m / apart_s
     if clocks < 1 or least >= most:
@@ -191,8 +191,8 @@ def sweep_of(scene: Scene, world: World, controller: object) -> Sweep | None:
 def start_of(scene: Scene, world: World) -> Progress:
     """Return the start of a run, under the push alone. If samples overlap, as many more are taken there.
 
-    The handle is at rest or, with a phase, has been pushed from rest for that part of a period of the force, and is at
-    the place of the start then.
+    The handle is at rest at the place of the start. With a phase, it has been pushed from rest for that part of a
+    period of the force and is then at this place.
     """
     protocol = scene.protocol
     cell, position_m = locate(world.encoder, protocol.start_m), protocol.start_m

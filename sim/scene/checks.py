@@ -1,4 +1,4 @@
-"""Checks of a scene; every error is a sentence that begins with the key and says what is accepted."""
+"""Checks of a scene. Every error is a sentence: it begins with the key, and gives the accepted values."""
 
 import math
 
@@ -118,7 +118,7 @@ def _fits(word: Word, value: float) -> bool:
 
 
 def _range_of(word: Word, scene: Scene) -> str:
-    """Return what the scene key of a word accepts; so are the numbers that it shows."""
+    """Return the values that a word's key accepts in a scene; its printed numbers are accepted, too."""
     if word.low > 0:
         return f"{word.si_min:g} to {word.si_max:g}"
     half = word.to_si(1) / 2

@@ -1,4 +1,5 @@
-"""The section of a virtual coupling: what couples the handle to a tool that a host simulates, and that tool."""
+"""The section of a virtual coupling: the spring and damper between the handle and a tool that a host simulates, and the
+tool."""
 
 import math
 
@@ -26,7 +27,7 @@ class CouplingSection(Section):
         return sample_hz // self.sample_hz
 
     def latency(self, sample_hz: int) -> int:
-        """Return the samples from the one that the host takes to the first one that feels the tool."""
+        """Return the number of samples from the host's sample to the first that feels the tool."""
         return max(round(self.delay_s * sample_hz), 1)
 
     def check(self, sample_hz: int) -> None:

@@ -1,4 +1,4 @@
-"""The section `drive` of a scene: which drive stage its board has, and what makes newtons of its output."""
+"""The section `drive` of a scene: the drive stage of its board, and the amplifier that makes newtons of its output."""
 
 from typing import Annotated, Literal
 
@@ -25,8 +25,8 @@ OF_A_DAC = "dac_"
 class DriveSection(Section):
     """The drive stage of the scene's board, and what makes newtons of its output: see `hardwall.model.drive`.
 
-    The amplifier is given either by its keys of volts or by those of amperes. Without this section a board has pulses,
-    whose full density is that of the drive's format.
+    The amplifier is described either in volts or in amperes. Without this section a board has pulses; their full
+    density stands for the drive format's full scale.
     """
 
     stage: Literal[tuple(STAGES)]
@@ -75,7 +75,7 @@ class DriveSection(Section):
         for stage, needed in NEEDED.items():
             own = {key for key in given if key in needed or (stage == "dac" and key.startswith(OF_A_DAC))}
             if stage != self.stage and own:
-                raise ValueError(f"drive.{min(own)} must be absent, for drive.stage is {self.stage}, not {stage}")
+                raise ValueError(f"drive.{min(own)} must be absent, because drive.stage is {self.stage}, not {stage}")
         for key in NEEDED[self.stage]:
             if key not in given:
                 raise ValueError(f"drive.{key} is missing")

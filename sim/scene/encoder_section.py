@@ -1,8 +1,7 @@
 """The section `encoder` of a scene: its scale, the errors of its edges, and what happens on its lines.
 
-Errors of place are in counts. Whatever moves edges is also summed up as the one number that the decoder's limits take:
-how far edges are moved against their neighbours (`error_counts`), and by jitter at a rate of edges
-(`error_counts_at`).
+Errors of place are in counts. All displacements of edges are also summed up in one number for the decoder's limits: the
+displacement against neighbouring edges (`error_counts`), and by jitter at a rate of edges (`error_counts_at`).
 """
 
 import math
@@ -21,7 +20,7 @@ from .section import Section
 ERROR_MAX_COUNTS = 0.5
 """The distance of an edge from its ideal place from which the decoder promises nothing."""
 LEAST_CUT_SIGMAS = 2.0
-"""The random displacement of edges is cut no nearer than this, for it would be normal no more."""
+"""The random displacement of edges is cut no nearer than this; otherwise it would not be normal any more."""
 EDGE_ERROR_MAX_COUNTS = MOST_COUNTS / LEAST_CUT_SIGMAS
 """The largest sigma of edges that have no other errors."""
 TOGETHER_MAX = 1000
@@ -123,7 +122,7 @@ class EncoderSection(Section):
 
     @property
     def depends_on_the_way(self) -> bool:
-        """Whether the pins are not those of the handle's place: hysteresis and whatever acts in time."""
+        """Whether the pins differ from the handle's place: by hysteresis, or by effects in time."""
         return self.hysteresis_counts > 0 or self.errors.lines is not None
 
     @cached_property

@@ -4,4 +4,4 @@ from ...model.runtime.input_error import InputError
 
 
 class SceneError(InputError):
-    """A scene is not valid; the message is one line that names the file, the key and what is accepted."""
+    """A scene is not valid. The message is one line: the file, the key and the accepted values."""

@@ -10,7 +10,7 @@ from .section import Section
 HANDS: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name("hands.toml").read_text("utf-8"))
 """The published hands by name: the keys `OF_A_HAND`, and `grip`, `source` and `seen`, whether it was read there."""
 OF_A_HAND = "mass_kg", "damping_n_s_per_m", "stiffness_n_per_m"
-"""The keys that make a hand, which a published one has already."""
+"""The keys that describe a hand; a published hand has them already."""
 
 
 class HandSection(Section):
@@ -28,7 +28,7 @@ class HandSection(Section):
         for key in OF_A_HAND:
             given = getattr(self, key) is not None
             if given and self.model:
-                raise ValueError(f"hand.{key} must be absent, for hand.model is {self.model}, which has its own")
+                raise ValueError(f"hand.{key} must be absent, because hand.model is {self.model}, which has its own")
             if not given and not self.model:
                 raise ValueError(
                     f"hand.{key} is missing: a hand has {', '.join(OF_A_HAND)}, or is a published one by hand.model, "

@@ -1,6 +1,6 @@
 """Reading of scenes: a TOML file, with some of its keys changed, becomes a checked `Scene`.
 
-Every error is one line that names the file, the key and what is accepted.
+Every error is one line: the file, the key and the accepted values.
 """
 
 import tomllib
@@ -42,7 +42,7 @@ def load(scene: str, changes: dict[str, Any] | None = None) -> Scene:
         changes: values by dotted key, e.g. `{"handle.mass_kg": 0.5}`; a value of None takes the key out.
 
     Raises:
-        SceneError: if the scene is not valid; the message is one line on what is wrong, where, and what is accepted.
+        SceneError: if the scene is not valid; the message is one line: the fault, its place, and the accepted values.
     """
     return parse(scene, read(scene), changes)
 
@@ -96,7 +96,7 @@ def content_of_scene(scene: str, text: str) -> dict[str, Any]:
     except ValueError as error:
         raise SceneError(f"{scene}: must be a readable TOML file: {error}") from None
     if "name" in content:
-        raise SceneError(f"{scene}: name is not a key of a scene: its file has its name")
+        raise SceneError(f"{scene}: name is not a key of a scene: the name of the file is the scene's name")
     return content
 
 
@@ -120,7 +120,7 @@ def made(scene: str, content: dict[str, Any], make: Callable[[dict[str, Any]], A
 
 
 def _of_the_wall(content: dict[str, Any], error: ValidationError, make: Callable) -> str | None:
-    """Return what is wrong with a wall, by the range of the scene's controller, narrower than that of its keys.
+    """Return the fault of a wall, by the range of the scene's controller, which is narrower than the range of the keys.
 
     None if something else is wrong with the scene, or the wall is none of numbers.
     """

@@ -1,4 +1,4 @@
-"""The section of a scene that describes a motor, and a circuit across its terminals that damps it."""
+"""The section of a motor in a scene, with a damping circuit across its terminals."""
 
 from .quantities import Capacitance, Inductance, Radius, Resistance, TorqueConstant, Voltage
 from .section import Section

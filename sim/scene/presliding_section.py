@@ -34,7 +34,7 @@ class PreslidingSection(Section):
         for key in OF_LUGRE:
             given = getattr(self, key) is not None
             if given and self.model == "dahl":
-                raise ValueError(f"presliding.{key} must be absent, for presliding.model is dahl, not lugre")
+                raise ValueError(f"presliding.{key} must be absent, because presliding.model is dahl, not lugre")
             if not given and self.model == "lugre":
                 raise ValueError(f"presliding.{key} is missing")
         if self.static_n is not None and self.static_n < coulomb_n:

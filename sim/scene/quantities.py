@@ -1,7 +1,7 @@
 """The quantities of a scene, each a type with the range that is accepted.
 
 `tests/scene/test_quantities.py` runs the loop at both ends of every range. The ranges are wide enough for any device
-that a hand touches, and narrow enough that no sum or product of such numbers leaves the range of float64.
+that a hand touches. They are narrow enough that no sum or product of such numbers leaves the range of float64.
 """
 
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
@@ -18,7 +18,7 @@ def number(least: float, most: float) -> Any:
 
 
 def _as_int(value: Any) -> Any:
-    """Return a float that is a whole number as an int, for that is how one writes a clock of `12e6`; else the value."""
+    """Return a float that is a whole number as an int, as people write a clock of `12e6`; else the value."""
     return int(value) if type(value) is float and value.is_integer() else value
 
 
@@ -28,7 +28,7 @@ def whole(least: int, most: int) -> Any:
 
 
 MARGIN = 1 + 1e-12
-"""What a computed limit is multiplied by, for the last bits of its products: a limit of few digits is accepted."""
+"""The factor on a computed limit, for the last bits of its products: so a limit written with few digits is accepted."""
 
 
 def rounded_down(limit: float) -> str:
@@ -42,7 +42,7 @@ def rounded_up(limit: float) -> str:
 
 
 def or_none(quantity: Any) -> Any:
-    """Return the type of a number that may also be 0, which stands for a part or an effect that is absent."""
+    """Return the type of a number that may also be 0: the part or effect is then absent."""
     (limits,) = quantity.__metadata__
     return number(0.0, next(mark.le for mark in limits.metadata if hasattr(mark, "le")))
 

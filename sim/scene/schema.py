@@ -1,6 +1,6 @@
-"""Scenes: TOML files that state what is modelled. A section or key that is absent is not modelled.
+"""Scenes: TOML files that describe the modelled device. A section or key that is absent is not modelled.
 
-Units are in the keys. Every error is one line that names the file, the key and what is accepted.
+Units are in the keys. Every error is one line: the file, the key and the accepted values.
 """
 
 import dataclasses
@@ -101,8 +101,8 @@ class WallSection(Section):
 
 
 class PassivitySection(Section):
-    """An observer of the energy that the drive gives, and a controller that damps by this much at most while it has
-    given more than it has taken: see `hardwall.model.axis.passivity`."""
+    """An observer of the energy that the drive gives to the handle, and a controller. While more energy was given than
+    taken, the controller damps by at most this much: see `hardwall.model.axis.passivity`."""
 
     damping_n_s_per_m: or_none(Damping)
 
@@ -135,7 +135,7 @@ class OutputSection(Section):
 
 
 class SolverSection(Section):
-    """Steps of semi-implicit Euler, no longer than `step_s`, as in most simulations; without this section the device is
+    """Steps of semi-implicit Euler of at most `step_s`, as in most simulations. Without this section the device is
     advanced exactly from event to event."""
 
     step_s: Step
@@ -150,8 +150,8 @@ class ProtocolSection(Section):
 
     `hardwall.sim.walls.hit_statistics` has what is said.
 
-    The place in the count of `start_m` and the phase of the push in a period of the force are those of one start among
-    many that differ by chance alone: see `hardwall.sim.walls.starts`.
+    `start_m` and the phase of the push are one start among many that differ by chance alone: the place within a count,
+    and the phase in a period of the force. See `hardwall.sim.walls.starts`.
     """
 
     start_m: Annotated[Place, Field(le=-1e-12)]
@@ -221,12 +221,12 @@ class Scene(Section):
 
     @property
     def held_by(self) -> WallSection | CouplingSection:
-        """What the axis renders a spring and a damper of: the wall, or the coupling to a tool that touches the wall."""
+        """The spring and damper that the axis renders: the wall, or the coupling to a tool that touches the wall."""
         return self.wall if self.coupling is None else self.coupling
 
     @property
     def felt_n_per_m(self) -> float:
-        """The stiffness that is felt at rest: the wall's, or that of wall and coupling one behind the other."""
+        """The stiffness felt at rest: the wall's, or of wall and coupling in series."""
         wall = self.wall.stiffness_n_per_m
         if self.coupling is None:
             return wall
@@ -263,7 +263,7 @@ class Scene(Section):
     def parameters(self) -> dict[str, float]:
         """Run-time parameters in SI units, by word; the count is 0 at the start, so the wall is at -`start_m`.
 
-        The surface of a coupling is a tool that is at the start, too, and the wall is that tool's.
+        With a coupling, the tool is at the start, too, and the wall acts on the tool.
         """
         si = {
             "encoder_glitch_clocks": self.glitch_clocks,

@@ -1,4 +1,4 @@
-"""What is wrong with a scene, in words."""
+"""The faults of a scene, in words."""
 
 import difflib
 import types
@@ -35,12 +35,12 @@ def listed(kind: Any) -> type[BaseModel] | None:
 
 
 def written(key: tuple[str | int, ...]) -> str:
-    """Return a key by its parts, of which numbers are places in lists, as `encoder.cycles[0].edges`."""
+    """Return a key from its parts; numbers are places in lists, as in `encoder.cycles[0].edges`."""
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in key).removeprefix(".")
 
 
 def stranger(key: tuple[str | int, ...]) -> str | None:
-    """Return the sentence that says that a key, by its parts, is none of a scene; None if it is one."""
+    """Return the sentence on an unknown key of a scene, by its parts; None for a known key."""
     section: type[BaseModel] | None = Scene
     for depth, part in enumerate(key):
         if isinstance(part, int):

@@ -1,7 +1,7 @@
 """A scene of several axes: every one of them is a scene of its own, and all share one pipeline.
 
 What is shared is the hardware, and the length of the run: `shared` names these keys. An axis may have any other key of
-its own, for its device and its wall, and for the words of the hardware that the host writes.
+its own: for its device, its wall, and the words of the hardware that the host writes.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ ABSENT = {
 }
 """The sections that a scene of several axes may not have, and why."""
 OWN_OF_CONTROLLER = {"output", "glitch_clocks", "slew_limit_n_per_s", "gains"}
-"""The keys of the controller that are run-time words, which every axis has of its own."""
+"""The keys of the controller that are run-time words: every axis has its own."""
 SHARED = {
     *(("controller", key) for key in ControllerSection.model_fields if key not in OWN_OF_CONTROLLER),
     *(("protocol", key) for key in ("settle_s", "mean_s", "measure_s", "longest_s", "verdict")),
@@ -46,7 +46,7 @@ class AxisScene(Scene):
     Attributes:
         axis: the name of the axis.
         number, axes: its number in the rota, from 0, and how many there are.
-        base: an axis that has nothing of its own in its controller; None for that one itself.
+        base: an axis without own keys in its controller; None for this axis itself.
     """
 
     axis: str

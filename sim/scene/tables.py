@@ -1,4 +1,4 @@
-"""The tables `[[axis]]` of a scene: what they say of each axis over what the sections at the top say of all.
+"""The tables `[[axis]]` of a scene: the keys of each axis, which replace the keys of the common sections.
 
 [wall]
 stiffness_n_per_m = 10e3        # of every axis that has none of its own
@@ -25,7 +25,7 @@ from .several import ABSENT, AxesScene, AxisScene, shared
 NAME = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
 Content = dict[str, Any]
-"""What a scene's file says, by section and key."""
+"""The content of a scene's file, by section and key."""
 
 
 def load_any(scene: str, changes: dict[str, Any] | None = None) -> Scene | AxesScene:
@@ -116,7 +116,7 @@ def _check_own(scene: str, name: str, key: tuple[str, ...]) -> None:
 
 
 def _change(scene: str, content: Content, tables: dict[str, Content], changes: dict[str, Any]) -> None:
-    """Put changes where they belong: those of single axes into their tables, the others in place of what tables say."""
+    """Apply changes: a change of a single axis goes into its table, any other replaces the keys of all tables."""
     of_all = {key: value for key, value in changes.items() if key.split(".")[0] != AXIS}
     for key, value in of_all.items():
         parts = key.split(".")
@@ -128,9 +128,9 @@ def _change(scene: str, content: Content, tables: dict[str, Content], changes: d
     for key in [key for key in changes if key not in of_all]:
         name, _, own = key.removeprefix(AXIS).removeprefix(".").partition(".")
         if name not in tables:
-            raise SceneError(f"{scene}: {shown(key)} is of no axis of this scene: they are {', '.join(tables)}")
+            raise SceneError(f"{scene}: {shown(key)} names no axis of this scene: its axes are {', '.join(tables)}")
         if not own:
-            raise SceneError(f"{scene}: {shown(key)} must go on with the key of a scene")
+            raise SceneError(f"{scene}: {shown(key)} must be followed by a key of a scene")
         _check_own(scene, name, tuple(own.split(".")))
         put(tables[name], scene, own, changes[key])
 
@@ -146,7 +146,7 @@ def _take_out(table: Content, parts: list[str]) -> None:
 
 
 def _merged(content: Content, table: Content) -> Content:
-    """Return what is said of all axes, with what a table says of its own in its place."""
+    """Return the keys common to all axes, with a table's own keys in their places."""
     result = copy.deepcopy(content)
     for key, value in table.items():
         both = isinstance(value, dict) and isinstance(result.get(key), dict)
@@ -155,7 +155,7 @@ def _merged(content: Content, table: Content) -> Content:
 
 
 def _with_the_axis(message: str, scene: str, name: str, content: Content, table: Content) -> str:
-    """Return a message that names the axis, unless it is about a key that is said of all axes."""
+    """Return a message that names the axis, unless it is about a key common to all axes."""
     said = message.removeprefix(f"{scene}: ")
     parts = re.match(r"[\w.]*", said)[0].split(".")
     of_all = _within(content, parts) and not _within(table, parts)

@@ -18,7 +18,7 @@ class Accuracy:
     Attributes:
         figure: number of the founding paper's figure that they reproduce; None for none.
         curves: the estimators.
-        rows: results of `accuracy.measure`, followed by those of `accuracy.measure_recording`.
+        rows: results of `accuracy.measure`, followed by results of `accuracy.measure_recording`.
         labels: labels of the curves, one for every row of a known motion.
     """
 

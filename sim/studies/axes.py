@@ -1,4 +1,4 @@
-"""What several axes in one pipeline take of a part, and how fast each of them is, against their number."""
+"""The resource use and the rate of several axes in one pipeline, against their number."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -10,14 +10,14 @@ from ..scene.load import load
 
 DEVICE = "ecp5-25k"
 SCENE = "mhz"
-"""The formats are those of its axis."""
+"""It has the formats of its axis."""
 CLOCK_HZ = 96_000_000
 """The clock that is asked for; the placer works as hard as it must for it."""
 NUMBERS = (1, 2, 4, 8, 16, 32)
 
 
 class AxesCosts(Rows):
-    """What axes take and how fast they are: rows of `cost`."""
+    """The resource use and the rate of axes: rows of `cost`."""
 
     def tables(self) -> list[Table]:
         """Return a table for every kind of axes."""
@@ -65,7 +65,7 @@ def cost(estimator: str, axes: int, supervised: bool, seeds: Iterable[int]) -> d
     """Return size and speed of axes that sample as fast as their rota allows, placed and routed alone.
 
     Returns:
-        estimator, axes, supervised, device, clock_mhz: what was synthesised, and the clock that was asked for.
+        estimator, axes, supervised, device, clock_mhz: the synthesised design, and the requested clock.
         lut4, ff, dsp, bram, available, untimed, latency_clocks, seeds, fmax_mhz_seeds, fmax_mhz: see
             `pipeline.synthesise_axes`.
         interval_clocks: the fewest clocks of a rota; max_sample_hz: the rate of each axis that follows at fmax_mhz.

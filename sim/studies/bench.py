@@ -28,8 +28,8 @@ COCOTB_SAMPLES = 2000
 
 
 def _parts(sample_s: float) -> dict[str, dict]:
-    """Return changes that give a scene one optional part, too slight to alter the motion but for bristles, which are
-    about those of LuGre's paper; the last has all of them that go together."""
+    """Return changes that each give a scene one optional part, too slight to alter the motion. Only the bristles are
+    not slight: they are about as in LuGre's paper. The last change has all parts that go together."""
     bare = {"handle.coulomb_n": None, "amplifier": None}
     cable = {"transmission.stiffness_n_per_m": 1e6, "transmission.damping_n_s_per_m": 10.0}
     motor = {"resistance_ohm": 2.0, "inductance_h": 3e-4, "torque_constant_n_m_per_a": 0.04}
@@ -165,7 +165,7 @@ def study(case: Case, progress: Callable[[str], None], against: Path | None = No
     Args:
         case: the scene.
         progress: function called with the name of the next measurement.
-        against: the program of another hardwall, whose commands are run in turns with those of this one.
+        against: the program of another hardwall; its commands and this one's are run in turns.
 
     Raises:
         RuntimeError: if the force words of the RTL under cocotb differ from the model's.

@@ -1,4 +1,4 @@
-"""What a bit buys: an estimator's error and logic as its words shrink, bit by bit, from the derived widths."""
+"""The value of a bit: an estimator's error and logic as its words shrink, bit by bit, from the derived widths."""
 
 from typing import Any
 

@@ -26,9 +26,9 @@ SITUATIONS: Situations = {
     "bad encoder": {"signal": "paper", "encoder": {"encoder.phase_error_counts": PHASE_ERROR_COUNTS}},
     "single edges": {"signal": "paper", "encoder": {"encoder.edge_error_counts": EDGE_ERROR_COUNTS}},
 }
-"""Motions of a handle: about 1 and 300 mm/s (not round speeds, whose counts lock to the samples), the paper's swing, a
-hit of a wall, a count that flickers, and the swing seen by two bad encoders: the errors of the one repeat every four
-edges, those of the other are each edge's own."""
+"""Motions of a handle: about 1 and 300 mm/s; the paper's swing, a hit of a wall, and a count that flickers. Round
+speeds are avoided: their counts lock to the samples. Two more are the swing seen by bad encoders: the errors of the
+first repeat every four edges, in the second each edge has its own error."""
 OWN = "own encoder"
 """The situation of an encoder that the user describes: the swing, too."""
 
@@ -69,7 +69,7 @@ class Choice:
         ]
 
     def notes(self) -> list[str]:
-        """Return the meaning of a star, and what is wrong with each encoder that has errors."""
+        """Return the meaning of a star, and the errors of each bad encoder."""
         encoders = {name: situation.get("encoder", {}) for name, situation in self.situations.items()}
         return ["*: the least error", *(f"{name}: {said_of(keys)}" for name, keys in encoders.items() if keys)]
 
@@ -94,7 +94,7 @@ def table(
         pairs: estimators and their outputs.
         measured: results of `accuracy.measure` for `jobs`, in the same order.
         costs: results of `costs.cost`, one for every estimator.
-        situations: those of `jobs`.
+        situations: as of `jobs`.
     """
     by_name = {row["estimator"]: row for row in costs}
     rows, each = [], len(situations)

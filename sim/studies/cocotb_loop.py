@@ -1,8 +1,8 @@
 """The closed loop with the RTL under cocotb, with which the compiled loop must agree and is compared in speed.
 
-The plant is the same compiled code, called sample by sample. The RTL is clocked by cocotb's own clock in C++ and
-awaited with timers, one for every change of a pin and two for every sample: the least Python with which cocotb works.
-The module runs inside the simulator; `sim.studies.bench` starts it.
+The plant is the same compiled code, called sample by sample. The RTL is clocked by cocotb's own clock in C++. Timers
+wait for it, one for every change of a pin and two for every sample: the least Python with which cocotb works. The
+module runs inside the simulator; `sim.studies.bench` starts it.
 """
 
 import hashlib

@@ -56,7 +56,7 @@ def cost(estimator: str, device: str, seeds: Iterable[int]) -> dict:
         lut4, ff, dsp, bram: cells of the estimator alone, before placing.
         latency_clocks: latency of the estimator, from strobe to valid.
         board: the report of `synthesis.synthesise`; None if the part has too few cells.
-        lacking: the cells that the board would use and those of the part, of each resource of which there are too few.
+        lacking: the cells needed and available of each resource that is too small for the board.
 
     Raises:
         SynthesisError: if a tool is missing or fails.

@@ -64,7 +64,7 @@ class Optimum:
 
     @cached_property
     def level_hz(self) -> tuple[float, float]:
-        """The range of cutoffs around the best that are equally good, limited to the cutoffs that were mapped.
+        """The range of equally good cutoffs around the best, limited to the mapped cutoffs.
 
         Between two maps the area is interpolated linearly over the logarithm of the cutoff. Where the starts do not
         tell a cutoff from the best, the range goes on to it.
@@ -202,7 +202,7 @@ def _searched(device: _Cases, sweep: dict[float, Map], unfiltered: Map, mapper: 
     maps = dict(sweep)
 
     def loss(log_cutoff: float) -> float:
-        # The cutoff that is tried is exactly the one that is printed.
+        # The cutoff is tried exactly as printed.
         cutoff_hz = float(f"{math.exp(log_cutoff):.4g}")
         if cutoff_hz not in maps:
             case = device.filtered(cutoff_hz)

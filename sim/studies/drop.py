@@ -3,13 +3,15 @@
 The explanation under test is `chatter`: at rest the output u still chatters, and B times the chatter is a force that
 friction either holds or does not, whatever the stiffness. There are four experiments:
 
-- *Shaken.* One wall with increasing B: the RMS of position after the settling mark, for Levant's u, for the same
-  differentiator and gains with an implicit Euler step, which does not chatter at rest, and for other estimators.
-- *Ends.* The B up to which three of four hits come to rest, and the B up to which they are stable, from soft walls to
-  stiff walls: a handle that is shaken by less than the threshold is stable too.
-- *Laws.* The B up to which three of four hits come to rest, measured in the closed loop, against the B up to which
-  `chatter` lets three of four cycles rest, predicted from the estimator alone. The changes are of friction, push, gains
-  and the number of samples a force, which are in the law, and of mass, count, delay and stiffness, which are not.
+- *Shaken.* One wall with increasing B: the RMS of position after the settling mark. It is taken for Levant's u, for
+  other estimators, and for Levant's differentiator with an implicit Euler step, which does not chatter at rest; the
+  gains are the same.
+- *Ends.* Two values of B, from soft walls to stiff walls: up to the first, three of four hits come to rest; up to the
+  second, they are stable. (A handle that is shaken by less than the threshold is stable, too.)
+- *Laws.* Two values of B are compared: up to the first, three of four hits come to rest, measured in the closed loop.
+  Up to the second, `chatter` lets three of four cycles rest, predicted from the estimator alone. Friction, push, gains
+  and the number of samples a force are changed, because they are in the law. Mass, count, delay and stiffness are
+  changed, too, though they are not in it.
 - *Maps.* The stable region of every method, as the founding paper traces it.
 """
 

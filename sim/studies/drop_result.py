@@ -98,7 +98,8 @@ class Drop:
         return None if boundary[-1].stable_n_per_m or len(stable) < 2 else stable[-2] / max(stable)
 
     def of_papers(self, name: str) -> float | None:
-        """Return a map's area over that of Levant u with the paper's adjusted gains; None where that is 0."""
+        """Return a map's area as a ratio to the area of Levant u with the paper's adjusted gains; None if that area is
+        0."""
         papers = self.maps["adjusted"].area
         return self.maps[name].area / papers if papers else None
 

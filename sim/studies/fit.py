@@ -11,7 +11,7 @@ paper's axes:
 
 The scene's own values are one of the first trials, so a fit can continue from an earlier fit. Trials are mapped in
 coarse steps, on a shortened protocol. If the region of Levant with adjusted gains ends far (`FAR`) from the end of the
-B axis, the other maps are not made, and no fact holds. The `FINALISTS` with the least sum are then judged in full: in
+B axis, the other maps are not made. No fact holds then. The `FINALISTS` with the least sum are then judged in full: in
 fine steps, on the scene's own protocol.
 """
 
@@ -36,7 +36,7 @@ READINGS = {"3-30": (3.0, 30.0), "30-300": (30.0, 300.0)}
 """The readings of the paper's B axis: its first and its last damping, N s/m."""
 STIFFNESS_AXIS_N_PER_M = 60e3
 BEYOND = 1.3
-"""The factor by which maps extend beyond the axes, so that the end of a region is seen."""
+"""The factor by which maps extend beyond the paper's axes, so that the end of a region is visible."""
 COARSE, FULL = 12, 54
 """The numbers of steps of B in a map."""
 STIFFNESS_STEP_N_PER_M = 1e3

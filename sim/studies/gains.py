@@ -1,16 +1,15 @@
 """A full search of Levant's gains: area of the stable region over lambda and alpha, for both outputs.
 
-The gains are spaced in equal ratios around those that the founding paper derives from C, the bound on the acceleration:
-lambda = sqrt(C) and alpha = 1.1 C. Pairs for which no words can be derived are left out. The paper's two pairs and the
-best pairs of the search are then mapped again in finer steps: the best of hundreds of coarse maps owes some of its area
-to chance.
+The gains are spaced in equal ratios around the founding paper's: lambda = sqrt(C) and alpha = 1.1 C, with C the bound
+on the acceleration. Pairs without derivable words are left out. The paper's two pairs and the best pairs of the search
+are then mapped again in finer steps: the best of hundreds of coarse maps owes some of its area to chance.
 
 The sufficient condition for convergence is alpha > C and lambda^2 >= 4 C (alpha + C) / (alpha - C).
 
 An area may mislead. At rest u chatters, with a period of two samples if the gains are large. A force that is updated
-once in an even number of samples always sees the same side of the chatter: a false velocity, whose force holds the
-handle still, but in the wrong position. So every pair has two areas: that of the stable walls, as in the paper, and
-that of the stable walls whose handle is also in place (`hit.Hit.in_place`).
+once in an even number of samples always sees the same side of the chatter. This is a false velocity: its force holds
+the handle still, but in the wrong position. So every pair has two areas: of the stable walls, as in the paper, and of
+the stable walls whose handle is also in place (`hit.Hit.in_place`).
 """
 
 from dataclasses import asdict, dataclass
@@ -54,7 +53,7 @@ class Search:
     Attributes:
         scene: the scene as it was searched.
         lambdas, alphas: the gains that were tried, ascending, m^(1/2)/s and m/s^2.
-        maps: maps in coarse steps, by output and gains; without gains for which no words can be derived.
+        maps: maps in coarse steps, by output and gains; gains without derivable words are left out.
         picks: the paper's gains and the best gains, by output and name.
         effort: effort of the maps.
     """
@@ -83,12 +82,13 @@ class Search:
         return np.array([[_area(a_map, in_place) if a_map else np.nan for a_map in row] for row in rows])
 
     def at_edge(self, gains: Gains) -> bool:
-        """Return whether gains are at the edge of the range that was tried, so that better gains may lie beyond."""
+        """Return whether gains are at the edge of the tried range: better gains may lie beyond."""
         ends = (self.lambdas[[0, -1]], gains.lambda_sqrt_m_per_s), (self.alphas[[0, -1]], gains.alpha_m_per_s2)
         return any(value in pair for pair, value in ends)
 
     def of_papers(self, pick: Pick) -> float | None:
-        """Return an area over that of the paper's better pair with the paper's output, u; None where that is 0."""
+        """Return an area as a ratio to the area of the paper's better pair with the paper's output, u; None if that
+        area is 0."""
         papers = max((self.picks["u"][name].map.area for name in PAPERS if name in self.picks["u"]), default=0.0)
         return pick.map.area / papers if papers else None
 
@@ -134,7 +134,7 @@ class Search:
         return [table_of(("output", "gains"), numbers, rows)]
 
     def notes(self) -> list[str]:
-        """Return which gains are at the edge of the range that was tried, and the meaning of a +."""
+        """Return the gains at the edge of the tried range, and the meaning of a +."""
         return [
             f"{output}, {name}: at the edge of what was tried; better gains may lie beyond"
             for output, name, pick in self._picks()

@@ -1,7 +1,7 @@
 """The bound C on the acceleration from a recorded hit, as the founding paper estimates it for Levant's gains.
 
-The wall is hit with a finite difference filtered at 500 Hz; a sum of seven sines is fitted to the recorded positions,
-and C is the largest magnitude of its second derivative (Figure 4).
+The wall is hit with a finite difference filtered at 500 Hz. A sum of seven sines is fitted to the recorded positions. C
+is the largest magnitude of its second derivative (Figure 4).
 
 The estimate has limits: seven sines cannot follow an impact, so C is less than the handle's true acceleration, and
 falls as the fitted record grows longer. Both accelerations are reported. The amplitudes are reported too: two sines of
@@ -79,7 +79,7 @@ class Lipschitz(Summary):
         }
 
     def notes(self) -> list[str]:
-        """Return what the record lacks of what was asked for."""
+        """Return the part of the requested record that is missing."""
         return self.cut
 
 

@@ -1,4 +1,4 @@
-"""Published rates of haptic loops on FPGAs, beside which those of the boards are shown; see the page of sources."""
+"""Published rates of haptic loops on FPGAs, shown beside the boards' rates; see the page of sources."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""What the rate buys: maps from 1 kHz to 1 MHz, estimator and force at the same rate, and at the scene's own rates.
+"""The gain of a higher rate: maps from 1 kHz to 1 MHz, estimator and force at one rate, and at the scene's own rates.
 
 A rigid device flatters a fast loop. So the scene's device should have an amplifier and a cable; the limit of the linear
 loop without them, with either, and with both shows which of them ends the gain.
@@ -40,14 +40,14 @@ GAINED = 0.95
 
 
 def at_rate(rate_hz: int) -> dict[str, Any]:
-    """Return the changes of a scene for a rate; the force has no delay but that of its own path."""
+    """Return the changes of a scene for a rate; the force has only the delay of its own path."""
     rates = {"controller.sample_hz": rate_hz, "controller.actuation_hz": rate_hz}
     return {"controller.clock_hz": CLOCK_HZ, "amplifier.delay_s": 0.0, **rates}
 
 
 @dataclass(frozen=True)
 class Gain:
-    """What the rate buys with one method.
+    """The gain of a higher rate with one method.
 
     Attributes:
         label: label of the method.
@@ -76,9 +76,9 @@ class Gain:
 
     @property
     def ratio(self) -> float | None:
-        """The largest stiffness at the highest rate over that at the scene's own rates.
+        """The largest stiffness at the highest rate, divided by the largest at the scene's own rates.
 
-        It is None where the latter is 0, or a map is clipped.
+        None if the divisor is 0, or a map is clipped.
         """
         if not self.own.largest_n_per_m or self.own.clipped or self.maps[-1].clipped:
             return None
@@ -117,7 +117,7 @@ class Rates:
     effort: Effort
 
     def report(self) -> dict[str, Any]:
-        """Return what the command line prints, units in the keys; a limit that is not found is None."""
+        """Return the report for the command line, with units in the keys; a limit that is not found is None."""
         methods = [each.report() for each in self.gains]
         limits = {parts: [k if isfinite(k) else None for k in limit] for parts, limit in self.limits.items()}
         return self.effort._asdict() | {"methods": methods, "linear_limits": limits}

@@ -1,12 +1,12 @@
-"""What a wall renders of what it is commanded: stiffness and damping by frequency, and rate-hardness at contact.
+"""The rendered against the commanded wall: stiffness and damping by frequency, and rate-hardness at contact.
 
-The handle is moved along a known path, so that stability is no question: what is rendered is what an instrument on the
-handle would measure, were the drive ideal. See `estimates.impedance` and `estimates.hardness` for the measures.
+The handle is moved along a known path, so stability plays no part. The rendered values are those that an instrument on
+the handle would measure with an ideal drive. See `estimates.impedance` and `estimates.hardness` for the measures.
 
-As the path is given, the estimate does not depend on the wall, and what is rendered is linear in K and B but for the
-words' rounding and limits: at a frequency B_r = -K T + B g, with a total delay T (`walls.theory.delay_s`, and half a
-period of the hold) and a gain g of the estimator. The spring alone, B = 0, gives K T; both together give the damping
-B* = K T / g below which the wall renders a negative one.
+As the path is given, the estimate does not depend on the wall. The rendered values are linear in K and B, except for
+the words' rounding and limits. At a frequency, B_r = -K T + B g: T is the total delay (`walls.theory.delay_s`, and half
+a period of the hold), g a gain of the estimator. The spring alone, B = 0, gives K T; both together give the damping B*
+= K T / g below which the wall renders a negative one.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""What the wall of a scene renders with one estimator at one rate, and what theory expects of it."""
+"""The values that a scene's wall renders with one estimator at one rate, and the values expected by theory."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -16,7 +16,7 @@ from ..walls.methods import Curve
 WITHIN = 0.1
 """The part of the commanded value by which a rendered one may be off and count as rendered."""
 SLOW_HZ = 10.0
-"""About how fast a hand shakes: the frequency at which the damping that the spring takes is measured."""
+"""The frequency at which the damping lost to the spring is measured: about the rate of a shaking hand."""
 
 
 class Spread(NamedTuple):
@@ -44,7 +44,7 @@ def rate_text(rate_hz: int) -> str:
 
 
 def slow_hz(frequencies_hz: Iterable[int]) -> int:
-    """Return that of some frequencies which is nearest to `SLOW_HZ`, as a ratio."""
+    """Return the frequency nearest to `SLOW_HZ`, by ratio."""
     return min(frequencies_hz, key=lambda frequency_hz: abs(math.log(frequency_hz / SLOW_HZ)))
 
 
@@ -57,7 +57,7 @@ class Setting:
         rate_hz: the rate of estimator and force; None for the scene's own.
         case: the scene at that rate.
         waves: results of `impedance.measure` by frequency, in Hz, ascending.
-        spring: that of the spring alone, at `slow_hz`; None without any frequency.
+        spring: the value of the spring alone, at `slow_hz`; None without any frequency.
         contacts: results of `hardness.measure`, by speed.
     """
 
@@ -118,7 +118,7 @@ class Setting:
         return spread([-spring / gain for spring, gain in zip(alone, gains, strict=True)])
 
     def _renders_to_hz(self, commanded: float, rendered: Callable[[int], Spread]) -> int | None:
-        """Return the highest frequency up to which all starts render what is commanded; None if at none."""
+        """Return the highest frequency up to which all starts render the commanded wall; None if there is none."""
         highest = None
         for frequency_hz in self.waves:
             ends = rendered(frequency_hz)

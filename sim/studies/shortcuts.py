@@ -1,8 +1,9 @@
-"""Shortcuts that make a simulation cheaper, grouped by what they leave out, and their changes of a scene.
+"""Shortcuts that make a simulation cheaper, grouped by the omitted effect, and their changes of a scene.
 
 Every axis of shortcuts begins with its boldest; the boldest are also combined in pairs. Parts that a scene lacks are
-the opposite: what is left out by those who describe a device without them. Two more changes, `scatter`, are too slight
-to be measured on a bench: what they move is chance, and tells how often a move is said that is none.
+the opposite: they show the error of a description that leaves them out. Two more changes, `scatter`, are too slight to
+be measured on a bench. They move the results by chance alone, and show how often the study reports a move where there
+is none.
 """
 
 from collections.abc import Callable
@@ -54,7 +55,7 @@ LACKED = {
 }
 """Parts that a device or a controller has and a scene may lack, each where the scene says none.
 
-Their figures are those of `docs/reference/scenes.md` where a data sheet or a paper has them.
+If a data sheet or a paper has their values, they are as in `docs/reference/scenes.md`.
 """
 SLOWER = 2, 5
 """The factors by which the sample rate is lower."""
@@ -197,7 +198,7 @@ class Contest:
     Attributes:
         scene: the scene, with the grid of the maps.
         curves: the estimators, labelled as on the command line.
-        shortcuts: all shortcuts; `computed` are those of a model, `hardware` those of the RTL.
+        shortcuts: all shortcuts; `computed`: a model's; `hardware`: the RTL's.
         refused: why the scene does not take a shortcut, by its label.
     """
 
@@ -207,7 +208,7 @@ class Contest:
         self._grid = grid_of(self.scene)
         if len(self._grid.dampings) < 2:
             key = f"{self.scene.name}: zwidth.damping_to_n_s_per_m"
-            raise SceneError(f"{key} must leave two values of B, for a map of one has no area")
+            raise SceneError(f"{key} must leave two values of B, because a map of one has no area")
         self.refused: dict[str, str] = {}
         self.curves = [replace(methods(self.scene)[method], label=method) for method in METHODS]
         self.shortcuts = shortcuts(self.scene, self._differs)

@@ -6,8 +6,8 @@ For given w_i the a_i and b_i follow from linear least squares, so only the w_i 
 sines are found one after the other; the search for a sine begins where the spectrum of the residual of the previous
 sines is strongest.
 
-Two sines of one frequency that cancel would fit a little better the larger they are, without an end, and the last bit
-of a sum would choose where the search stops. So an amplitude costs something, and the derivatives by w are exact.
+Two sines of one frequency that cancel fit a little better the larger they are, without an end. The last bit of a sum
+would then choose where the search stops. So an amplitude costs something, and the derivatives by w are exact.
 """
 
 from dataclasses import dataclass
@@ -92,7 +92,8 @@ def _searched(times_s, values, start, slowest, fastest) -> np.ndarray:
         return basis @ _amplitudes(times_s, values, rad_per_s) - np.pad(values, (0, basis.shape[1]))
 
     def derivatives(rad_per_s):
-        # Of the residual, but for what is in the span of the basis: of that the gradient has nothing (Kaufman 1975).
+        # The gradient of the residual outside the span of the basis; the part inside contributes nothing (Kaufman
+        # 1975).
         basis, sines = _basis(times_s, rad_per_s), len(rad_per_s)
         sine, cosine = np.split(_amplitudes(times_s, values, rad_per_s), 2)
         slopes = times_s[:, None] * (basis[: len(times_s), sines:] * sine - basis[: len(times_s), :sines] * cosine)

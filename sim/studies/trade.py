@@ -4,7 +4,7 @@ The reference is the bit-accurate model with every part of the scene, the exact 
 steps of K. Two things are compared with it, for two estimators:
 
 - the edge of the shortcut's own map, from the same starts, draw by draw of these: see `walls.edge_shift`;
-- the time of a hit, the mean over a wall of every B, and the time of a map: that of a hit times its number of hits.
+- the time of a hit, the mean over a wall of every B; and the time of a map: the time of a hit times its number of hits.
 
 The hardware has the verdicts of `fixed`, because it has its force words: every hit of the hardware checks that.
 """
@@ -96,7 +96,7 @@ class Trade:
         return list(self.points[0].moves)
 
     def best(self, label: str) -> list[Point]:
-        """Return the points for which no other map is as fast and as surely right for an estimator."""
+        """Return the points that no other map beats in both speed and certainty for an estimator."""
         return best(self.points, lambda point: point.map_s, lambda point: point.moves[label].distance)
 
     def report(self) -> dict[str, Any]:
@@ -158,7 +158,7 @@ def area_text(move: Move) -> str:
 
 
 def best(points: list[Point], cost: Callable[[Point], float], error: Callable[[Point], float]) -> list[Point]:
-    """Return the points for which no other is as good in both, by rising cost and falling error."""
+    """Return the points that no other beats in both cost and error, by rising cost and falling error."""
     front: list[Point] = []
     for point in sorted(points, key=lambda point: (cost(point), error(point))):
         if not front or error(point) < error(front[-1]):
@@ -211,7 +211,7 @@ def study(case: Case, runs: Runs) -> Trade:
 
     Raises:
         SceneError: if the scene is not valid, or has no section `zwidth`.
-        RuntimeError: if no wall of a reference's map is stable, or the hardware's force words are not those of `fixed`.
+        RuntimeError: if no wall of a reference's map is stable, or the hardware's force words differ from `fixed`'s.
     """
     began, contest = time.perf_counter(), Contest(case)
     maps = _maps(contest, runs, [REFERENCE])

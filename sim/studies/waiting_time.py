@@ -52,7 +52,7 @@ FIGURE_5 = (
     *("zwidth", "seed-2011", "--starts", "1", "--set", "protocol.verdict=literal"),
     *("--set", "zwidth.damping_step_n_s_per_m=42.0", "--json"),
 )
-"""The paper's own Figure 5, coarse in B: hits whose length is bounded, so that it can be waited for on the RTL, too."""
+"""The paper's own Figure 5, coarse in B: hits of bounded length, short enough for the RTL, too."""
 COMMANDS = {
     "float (samples/s)": Command(("hit", SCENE, "--backend", "float", "--json"), 5, speed=True),
     "fixed (samples/s)": Command(("hit", SCENE, "--json"), 5, speed=True),
@@ -76,7 +76,7 @@ def program_of(folder: Path) -> Path:
         ValueError: if there is none.
     """
     for place in PLACES:
-        # What cannot be looked at, as a name that is too long, is none.
+        # A path that cannot be examined, for instance with too long a name, is none.
         if os.path.exists(folder / place):
             return folder.absolute() / place
     raise ValueError(f"must be a checkout in which make tools has run, or an environment with hardwall, not {folder}")
@@ -163,7 +163,7 @@ def measure(text: str, against: Path | None, progress: Callable[[str], None]) ->
     for name, command in COMMANDS.items():
         values: list[list[float]] = [[], []]
         sides = programs
-        # The first run of those that find things kept is the one that keeps them.
+        # The first warm run fills the cache.
         untimed = int(not command.cold)
         for number in range(-untimed, command.rounds):
             progress(f"round {number + 1} of {command.rounds}: {name}")

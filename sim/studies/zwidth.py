@@ -111,8 +111,8 @@ class ZWidth:
                 writer.writerow((*place, *(hit[key] for key in keys)))
 
     def _hits(self) -> Iterator[tuple[str, Wall, int, dict]]:
-        """Yield every hit once, with the label of its case, its wall and the number of its start: those of a worst case
-        are of its variants, whose own maps may have had them."""
+        """Yield every hit once, with the label of its case, its wall and the number of its start. The hits of a worst
+        case belong to its variants, whose own maps may have them already."""
         seen = set()
         for each in self.maps:
             labels = {name: case.label for name, case in each.case.variants.items()}
@@ -130,9 +130,9 @@ def study(case: Case, curves: list[Curve] | None, hands: list[str] | None, mappe
 
     Args:
         case: the scene.
-        curves: the methods; None for those of the paper's Figure 5.
-        hands: the hands that hold the handle, by name, each in a map of its own and the worst of several in another;
-            None for what the scene has.
+        curves: the methods; None for the methods of the paper's Figure 5.
+        hands: the hands on the handle, by name: one map each, and one more of the worst of several. None: the scene's
+            hand.
         mapper: function that makes the maps.
 
     Raises:

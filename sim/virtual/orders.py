@@ -1,4 +1,4 @@
-"""What a person may do to a virtual board while it runs: hold and push the handle, cut a wire, stop the clock."""
+"""A person's orders to a running virtual board: hold and push the handle, cut a wire, stop the clock."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ FREE = "free"
 
 
 class OrderError(ValueError):
-    """An order that is none: one line that says what is accepted."""
+    """An invalid order; the one line of the message says what is accepted."""
 
 
 @dataclass(frozen=True)

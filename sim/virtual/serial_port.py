@@ -38,13 +38,13 @@ class Line:
         try:
             self._listener = None if tcp_port is None else socket.create_server((LOOPBACK, tcp_port), backlog=1)
         except OSError as error:
-            raise PortError(f"port {tcp_port} of {LOOPBACK} cannot be had: {os.strerror(error.errno)}") from None
+            raise PortError(f"port {tcp_port} of {LOOPBACK} cannot be opened: {os.strerror(error.errno)}") from None
         try:
             self._master, self._slave = pty.openpty()
         except OSError as error:
             if self._listener:
                 self._listener.close()
-            raise PortError(f"there is no pseudo-terminal to be had: {error.strerror or error}") from None
+            raise PortError(f"no pseudo-terminal can be opened: {error.strerror or error}") from None
         # The slave is kept open, so that the terminal stays when a host closes it.
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
@@ -79,10 +79,10 @@ class Line:
         return self._listener.getsockname()[1] if self._listener else None
 
     def take(self, wait_s: float, room: int) -> bytes:
-        """Return the bytes that have come from hosts, and wait for them for some time; what is lost is left out.
+        """Return the bytes that have come from hosts, and wait for them for some time, without lost bytes.
 
-        A host waits for an answer, so what sends more than there is room for is none. What it sends is lost, so that
-        others are soon heard again: a guest is sent away, with all that it has sent.
+        A host waits for an answer, so a sender of more bytes than `room` is no host. If it is a guest it is sent away,
+        and all its bytes are dropped, so that others are soon heard again.
 
         Args:
             wait_s: the longest wait, s.

@@ -1,8 +1,8 @@
 """A virtual board: the Verilated `board` with the scene's plant beside it, in simulated time.
 
-The compiled loop closes it as it closes an axis: the handle makes edges, the board takes them through its pins, and the
-amplifier's mean of a sample is the force on the handle during the next one. What is behind the board's serial line
-are bytes. The wall, and whether there is a drive at all, is for a host to say.
+The compiled loop closes it like an axis: the handle makes edges, and the board takes them through its pins. The
+amplifier's mean of a sample is the force on the handle during the next one. What is behind the board's serial line are
+bytes. The wall, and whether there is a drive at all, is for a host to say.
 """
 
 from dataclasses import dataclass
@@ -24,12 +24,12 @@ TURN_M = 4e-3
 HOLD_PER_S = 30.0
 """How fast a hand brings the handle to where it holds it: the rate of a critically damped spring."""
 GRASP_S = 1e-3
-"""The time for which the hand's force stays as it is; much shorter than 1 / `HOLD_PER_S`."""
+"""The time in which the hand's force is constant, s; much shorter than 1 / `HOLD_PER_S`."""
 
 
 @dataclass
 class Hand:
-    """What the hand does: hold the handle somewhere, or push it, or both.
+    """The hand: it holds the handle somewhere, or pushes it, or both.
 
     Attributes:
         held_m: where it holds the handle; None: it does not.
@@ -49,7 +49,7 @@ class Hand:
 
 @dataclass(frozen=True)
 class Handle:
-    """What the handle does now: its position, velocity and the force of the amplifier on it."""
+    """The handle now: its position, velocity and the force of the amplifier on it."""
 
     time_s: float
     position_m: float
@@ -72,14 +72,14 @@ class VirtualBoard:
         positions_m: where the handle was at the strobes of the last `run`.
 
     Raises:
-        SceneError: if the scene has an output of its own, for the board's is that of its drive stage.
+        SceneError: if the scene has an `[output]`: a board's output is its drive stage.
         BuildError: if the hardware cannot be built.
         SynthesisError: if its netlist cannot be made.
     """
 
     def __init__(self, scene: Scene, baud: int | None = None, family: str | None = None):
         if scene.output is not None:
-            raise SceneError(f"{scene.name}: output must be absent, for the drive stage of the board is its output")
+            raise SceneError(f"{scene.name}: output must be absent, because the drive stage of the board is its output")
         # The board's own stage makes the steps of its force.
         self.scene, self._world = scene, world_of(scene)._replace(converter=None)
         self._progress = start_of(scene, self._world)
@@ -118,12 +118,12 @@ class VirtualBoard:
     def counts(self) -> np.ndarray:
         """The counts of the encoder at the strobes of the last `run`; the board has each a few clocks later.
 
-        They are those of its scale: what its lines do to edges is for the board alone to see.
+        They are the counts of its scale; effects of its lines on edges reach only the board.
         """
         return numbers_from(self._world.encoder, self._cell, self.positions_m) - self._number
 
     @property
     def handle(self) -> Handle:
-        """What the handle does now."""
+        """The handle now."""
         motion, rate = self._progress.moment.motion, self.scene.spec.sample_hz
         return Handle(self._progress.sample / rate, motion[0], motion[1], self._progress.force_n - self._push_n)

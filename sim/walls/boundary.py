@@ -1,12 +1,11 @@
 """The walls of a map, and who hits them: at every B a search for the K at which as many starts are stable as not.
 
 Stiffness K and damping B go in steps. At each B, from the K of the B before, `SCOUTS` starts look for two neighbours in
-K, the softer of which is stable for half of them and the stiffer one is not: in steps that double, then by halves. If
-nothing is stable below, one start looks at every doubling of K from the first step on. All starts then hit both
-neighbours, and walls at twice the distance each time, until `SURE` of them are stable below and unstable above. Farther
-off one start hits a wall at every fourfold distance, down to the first step of K and up to the last, at every B of a
-map that has few and at some `PATROLS` of one that has many: the region of stable walls may have holes, and islands
-around it.
+K: the softer one is stable for half of the starts, and the stiffer one is not. The steps double, then halve. If nothing
+is stable below, one start looks at every doubling of K from the first step on. All starts then hit both neighbours, and
+walls at twice the distance each time, until `SURE` of them are stable below and unstable above. Farther off, one start
+hits a wall at every fourfold distance, down to the first step of K and up to the last. It does so at every B of a map
+with few B, and at some `PATROLS` of a map with many. The region of stable walls may have holes, and islands around it.
 
 Nothing here hits a wall: `walls` is a generator that yields walls and starts, and is sent verdicts. So the map does not
 depend on the source of the verdicts, or on the order in which several maps get theirs.
@@ -100,7 +99,7 @@ class _Column:
         self._verdicts: dict[int, dict[int, str]] = {}
 
     def _share(self, row: int, starts: list[int]) -> Generator:
-        """Have a wall hit by starts that have not yet; return the share of all that are stable."""
+        """Hit a wall from the remaining starts; return the share of stable hits among all."""
         known = self._verdicts.setdefault(row, {})
         missing = [start for start in starts if start not in known]
         if missing:

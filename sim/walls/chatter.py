@@ -4,7 +4,8 @@ At a constant count some estimators do not come to rest: they go through one of 
 force is updated only once in several samples, and takes one value of the cycle each time. These values are the cycle's
 alias, which may be a single value: a constant velocity where there is none.
 
-A handle with Coulomb friction f_c, pushed by P into a wall (K, B), rests at x if for every value u that the force takes
+A handle with Coulomb friction f_c is pushed by P into a wall (K, B). It rests at x if, for every value u that the force
+takes,
 
     |P - K x - B u| <= f_c,    and x > 0.
 
@@ -35,7 +36,7 @@ SEED = 1
 
 @dataclass(frozen=True)
 class Chatter:
-    """The velocity that the force sees for a handle at rest: the ends of every cycle that was met.
+    """The velocity that the force takes for a handle at rest: the extremes of every cycle found.
 
     Attributes:
         least_m_per_s, most_m_per_s: shape (cycles,), one value for each preceding motion.
@@ -88,7 +89,7 @@ def at_rest(scene: Scene, backend: str) -> Chatter:
     """Return the chatter of a scene's estimator.
 
     Args:
-        scene: the scene, of which estimator, gains, output and rates are used.
+        scene: the scene; its estimator, gains, output and rates are used.
         backend: `float` or `fixed`.
 
     Raises:

@@ -1,8 +1,8 @@
 """The exact boundary of the linear loop with a virtual coupling: handle, axis and tool, over a period of both rates.
 
-As `theory.Loop`, with the tool of `loop.coupled` in contact with its wall. The state has six numbers more: the tool's
-position and velocity, those of the surface that the axis has, and those of the next one. Neither the rounding of the
-surface to counts nor that of its velocity is in it.
+As `theory.Loop`, with the tool of `loop.coupled` in contact with its wall. The state has six more numbers: position and
+velocity of the tool, of the axis's present surface, and of the next surface. The rounding of the surface's position and
+velocity is left out.
 """
 
 import math

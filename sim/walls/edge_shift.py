@@ -1,4 +1,4 @@
-"""How far the edge of one map lies from that of another, draw by draw of the starts that both have."""
+"""The distance between the edges of two maps, draw by draw of their common starts."""
 
 from typing import NamedTuple
 
@@ -9,14 +9,14 @@ from .zwidth import Map, interval
 
 
 class Move(NamedTuple):
-    """What differs between the edges of two maps.
+    """The difference between the edges of two maps.
 
     Attributes:
         area: the ratio of their areas.
         low, high: the ends of its interval, of draws of the starts; 0 and infinity if the other area may be 0.
         step: the part of the other area that a step of K is, all along its edge: no map tells less.
-        stiffness: the farthest move of K at one B, as a part of the other's K there; 0 where none is beyond its own
-            interval and a step, and infinity where there is an edge at a B at which the other has none.
+        stiffness: the farthest move of K at one B, as a fraction of the other's K there. It is 0 if no move is beyond
+            its own interval and a step. It is infinite if there is an edge at a B at which the other has none.
         dampings: number of B at which K moved beyond its interval and a step.
         clipped: whether one of the regions goes on beyond the largest K of the map, so that the areas are bounds.
     """

@@ -1,20 +1,20 @@
 """Seven facts that the founding paper states of its Figure 5, of six methods, and whether maps show them too.
 
 An eighth, that the region does not grow discernibly from 1000 to 4000 Hz, is of filters that the figure does not have.
-That Levant has higher stiffness than every filter over an equal range of damping is read here as a larger area over
-that range; at how many B its stiffness is at least as high is among the numbers.
+The paper says that Levant has higher stiffness than every filter over an equal range of damping. Here this is read as a
+larger area over that range. The number of B at which its stiffness is at least as high is among the numbers.
 
-The paper's B axis is known except for zeros that may be missing. So the facts are judged over a range that the maps
-themselves give: from their first B to the end of Levant with adjusted gains, which in the figure is about all of it.
+The paper's B axis is known except for zeros that may be missing. So the facts are judged over a range from the maps
+themselves: from their first B to the end of Levant with adjusted gains. In the figure this is almost the whole range.
 
 Every fact has a shortfall: 0 if it holds, 1 if nothing of it is there, and between them the part that is lacking:
 
 - a region that should be larger than another: the part of the other's area by which it is smaller;
 - a region that should enclose others: the part of their area in the range that is outside it;
-- a sharp drop: the error of its place beyond `ABOUT`, and the part of the largest K that is lacking to half of it a
-  step before the drop; where the region has not ended, the last K over the largest;
-- 500 Hz that should go on: the part of the range by which it ends early; where it goes on too stiff, the part by which
-  K exceeds Levant's largest;
+- a sharp drop: the error of its place beyond `ABOUT`, and the missing fraction of half of the largest K a step before
+  the drop; if the region has not ended, the last K over the largest;
+- 500 Hz that should go on: the fraction of the range by which it ends early; if it goes on too stiff, the excess of K
+  over Levant's largest, as a fraction;
 - K that should rise and fall: a quarter for each rise or fall that is missing.
 """
 
@@ -38,7 +38,7 @@ Judged = tuple[bool, float, str]
 class Fact:
     """A fact of the paper's figure, whether the maps show it, their shortfall from 0 to 1, and the numbers.
 
-    `share` is that of the draws of the starts that show it; None if that was not asked for.
+    `share` is the share of the draws of the starts that show it; None if not asked for.
     """
 
     text: str

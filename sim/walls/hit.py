@@ -55,8 +55,8 @@ class Hit(Summary):
         mean_m: mean position of the window that was judged, or in the literal protocol before the settling mark, m;
             positive is inside the wall.
         rms_m: RMS distance that the verdict is of, m.
-        offset_m, drift_m_per_s: the way from the mean before the settling mark to that of the window that was judged,
-            and the slope of the position over it.
+        offset_m, drift_m_per_s: the distance from the mean before the settling mark to the mean of the judged window,
+            and the slope of the position over this window.
         judged: `stable`, `unstable` or `undecided`, as if the wall was touched: see `tally`.
         touched: whether the handle ever was within the wall, or felt it.
         force_sha256: digest of the drive words of every actuation, little-endian int32; None for `float`.
@@ -82,7 +82,7 @@ class Hit(Summary):
 
     @property
     def verdict(self) -> str:
-        """What is said of the wall: `stable`, `unstable` or `undecided`. One that was never touched is not stable."""
+        """The verdict: `stable`, `unstable` or `undecided`. A wall that was never touched is not stable."""
         return self.judged if self.touched else UNSTABLE
 
     @property
@@ -94,10 +94,10 @@ class Hit(Summary):
     def in_place(self) -> bool:
         """Whether the handle rests where the wall's spring alone would hold it.
 
-        At rest the velocity is 0, and the spring carries the push and the hand, up to the friction that sticks, a step
-        of the output and the position hidden in a count. A stable wall may be felt elsewhere: where the estimate is not
-        0 at rest, its damper carries a part. In the literal protocol, the mean after the settling mark is not farther
-        from the mean before it than the RMS.
+        At rest the velocity is 0, and the spring carries the push and the hand. The remainder is at most the sticking
+        friction, a step of the output and the position hidden in a count. A stable wall may be felt elsewhere: where
+        the estimate is not 0 at rest, its damper carries a part. In the literal protocol, the mean after the settling
+        mark is not farther from the mean before it than the RMS.
         """
         scene, stiffness = self.scene, self.scene.felt_n_per_m
         hand, cable = scene.hand, scene.transmission
@@ -200,9 +200,9 @@ class Hit(Summary):
 
 
 _compiled: set[Any] = set()
-"""What `_kinds` returned for the arguments of the loops that this process has compiled."""
+"""The results of `_kinds` for the arguments of the loops compiled in this process."""
 _compiling = threading.Lock()
-"""Held by the thread that compiles: the others, whose loop may be the same, wait in silence."""
+"""Held by the compiling thread: the others may need the same loop, and wait in silence."""
 
 
 def _kinds(value: Any) -> Any:
@@ -281,7 +281,7 @@ class Loop:
         return frozenset(sample for first in firsts for sample in (first, first + period))
 
     def _rests(self, state, before: tuple[int, Any] | None) -> tuple[int, Any]:
-        """Judge a handle that rests if the loop is now what it was at the look before; return this look."""
+        """Judge a resting handle if the loop's state equals the last look's; return this look."""
         now = repetition.seen(state, self.at, self.memory, self.scene.spec.clocks_per_sample)
         if before and before[1] == now and self.tally.still_from < before[0]:
             self.tally.rest()
@@ -364,8 +364,8 @@ def run(
         traces: keep samples of the whole run and of the contact.
         progress: called with the number of samples done.
         vcd: for `rtl`, a VCD file to write, with every signal around the contact.
-        until_sure: end a run whose handle rests for ever, or outruns the encoder by far, and in the literal protocol
-            one that is certainly unstable; `rms_m` is then 0, infinite, or the RMS up to that point.
+        until_sure: end a run whose handle rests for ever, or outruns the encoder by far; in the literal protocol also a
+            run that is certainly unstable. `rms_m` is then 0, infinite, or the RMS up to that point.
 
     Raises:
         RuntimeError: if the handle outran every decoder's limit by far, or the RTL could not be built.

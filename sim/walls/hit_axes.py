@@ -1,7 +1,7 @@
 """Hits of several axes at once: a handle and a wall for each, and one pipeline for all.
 
-In `float` and `fixed` every axis has a loop of its own, which takes the samples and changes the drive at the clocks of
-the axis's turn in the rota: nothing goes from one axis to another. In `rtl` the hardware of all axes is one.
+In `float` and `fixed` every axis has its own loop. The loop takes the samples and changes the drive at the clocks of
+the axis's turn in the rota. Nothing goes from one axis to another. In `rtl` the hardware of all axes is one.
 """
 
 import json
@@ -45,7 +45,7 @@ class AxesHit:
         return all(each.detail is not None for each in self.hits.values())
 
     def report(self) -> dict[str, Any]:
-        """Return what is of all axes, with units in the keys, and the report of every axis under `rows`."""
+        """Return the values common to all axes, with units in the keys, and the report of every axis under `rows`."""
         samples = self.scene.samples * len(self.hits)
         return {
             "scene": self.scene.name,
@@ -125,7 +125,7 @@ def _run_rtl(scene: AxesScene, traces: bool, progress: Callable[[int], None] | N
 def _rounds(ways: list[Iterator[int]], loops: list[hit.Loop], scene: AxesScene) -> Iterator[int]:
     """Let the loops take their turns to the end; yield the number of samples of every axis that are done, now and then.
 
-    Every loop's samples are tallied when its arrays are full, as those of a loop that runs alone.
+    Every loop's samples are tallied when its arrays are full, as in a loop that runs alone.
 
     Raises:
         RuntimeError: if a handle outran every decoder's limit by far.

@@ -10,7 +10,7 @@ REST_MM = 1e-6
 NUMBERS = ("K (N/m)", "B (N s/m)", "wall", "RMS (mm)", "peak force (N)", "velocity error (mm/s)", "force words")
 """The headings of a row behind its name."""
 NEVER = "never touched"
-"""What people are told in place of the verdict, for a wall that the handle never reached or felt."""
+"""The text in place of the verdict, for a wall that the handle never reached or felt."""
 NOTES = (
     "RMS: distance of the handle from its line over the judged window (literal protocol: from its mean before); "
     "less than a nanometre is at rest. A handle that the wall does not hold, so that it leaves the device's travel at "

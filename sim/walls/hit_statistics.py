@@ -1,24 +1,24 @@
 """The statistics of a hit, sample by sample, and what they say of the wall.
 
-The wall is judged over windows of `measure_s`, the first of which begins at the settling mark:
+The wall is judged over windows of `measure_s`; the first one begins at the settling mark:
 
 - *stable* if the RMS distance of the position from its least-squares line over a window is under the threshold, and
   the wall holds the handle;
-- *unstable* if it is not under the threshold, and is more than `FALLING` of that over the window before; or if the
-  wall does not hold the handle: where the line goes on for `longest_s`, it leaves the device's travel;
+- *unstable* if it is not under the threshold, and is more than `FALLING` times the window before; or if the wall does
+  not hold the handle: its line, continued for `longest_s`, leaves the device's travel;
 - else it still falls: the run goes on with another window, and is *undecided* if no other ends within `longest_s`.
 
 A heavy handle bounces so slowly that a window has few swings. Their RMS says nothing: it depends on where in a swing
 the window begins, by 1 / (pi n) of itself for n swings. So the last windows that together hold `ENOUGH` swings are
-taken for one, and so are those before them, back to the first that begins behind a swing. For most handles these are
-the last window and the one before. Where there are not enough, the run goes on as well.
+taken as one. So are the windows before them, back to the first one that begins after a swing. For most handles these
+are the last window and the one before. Where there are not enough, the run goes on as well.
 
-The first window has one before it too, which ends at the settling mark. A handle that creeps or has come to rest in
-another place is not unstable for that: the *offset*, from the mean over `mean_s` before the mark to the mean of the
-window that was judged, and the *drift* are said beside the verdict.
+The first window has one before it too, which ends at the settling mark. A handle that creeps, or comes to rest in
+another place, is not unstable for that. Beside the verdict the report has the *drift* and the *offset*: from the mean
+over `mean_s` before the mark to the mean of the judged window.
 
-The founding paper's protocol, `verdict = "literal"`, has one window, and the RMS distance from the mean before the
-mark: its square is that of the distance from the line, plus that of the offset, plus that of what the drift spreads.
+The founding paper's protocol, `verdict = "literal"`, has one window, and takes the RMS distance from the mean before
+the mark. Its square is the sum of three squares: the distance from the line, the offset, and the spread by the drift.
 """
 
 import hashlib
@@ -31,7 +31,7 @@ from .swings import Swings, swung
 from .window import Room, Window
 
 FALLING = 0.9
-"""An RMS that is less than this part of the one before is falling."""
+"""An RMS below this fraction of the one before is falling."""
 ENOUGH = 8
 """Fewest swings that are compared with others. A swing is as long as the threshold at least."""
 STABLE, UNSTABLE, UNDECIDED = "stable", "unstable", "undecided"
@@ -49,7 +49,7 @@ class Tally:
         farthest_m: the largest position.
         still_from: number of the first sample since which the position has not changed.
         verdict: what is said of the wall; None until then.
-        rms_m: the RMS that it was said for, or that of the window before: infinite before the first one.
+        rms_m: the RMS on which the verdict rests; until then the RMS of the last window, infinite before the first one.
     """
 
     def __init__(self, scene: Scene, exact: bool):
@@ -81,12 +81,12 @@ class Tally:
 
     @property
     def mean_m(self) -> float:
-        """The mean position of the window that was judged; of the literal protocol, that before the settling mark."""
+        """The mean position of the judged window; in the literal protocol, the mean before the settling mark."""
         return self._mark_m if self._literal or self._judged is None else self._judged.mean_m
 
     @property
     def offset_m(self) -> float:
-        """The way from the mean before the settling mark to that of the window that was judged; 0 without one."""
+        """The distance from the mean before the settling mark to the mean of the judged window; 0 without one."""
         return self._judged.mean_m - self._mark_m if self._judged else 0.0
 
     @property
@@ -96,7 +96,7 @@ class Tally:
 
     @property
     def window_end(self) -> int:
-        """Number of the sample at which the window ends that is under way."""
+        """Number of the sample at which the present window ends."""
         return self._window_from + self._window.samples
 
     @property
@@ -184,7 +184,7 @@ class Tally:
         return last is not None and before is not None and last.rms_m >= FALLING * before.rms_m
 
     def _verdict_of(self, still: Window) -> str:
-        """Return what is said of a wall whose handle does not oscillate: stable if the wall holds it.
+        """Return the verdict on a wall whose handle does not oscillate: stable if the wall holds it.
 
         A handle that nothing holds soon has a constant speed, and is on its line, too.
         """

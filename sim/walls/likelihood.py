@@ -1,7 +1,7 @@
 """How likely a wall is stable: a curve that falls in K at every B, by maximum likelihood, and how sure it is.
 
-Hits of a wall from several starts are draws of one chance. The chances that fall in K and make the verdicts at one B
-most likely are the isotonic regression of the shares of stable hits, weighted by their numbers (SciPy). The boundary is
+Hits of a wall from several starts are draws of one chance. Chances that fall in K and make the verdicts at one B most
+likely are an isotonic regression (SciPy): of the shares of stable hits, weighted by their numbers. The boundary is
 where that curve, straight between walls that were hit and 1 without a wall, passes one half.
 
 An interval is of the starts, the percentiles of bootstraps: as many starts are drawn from the starts, with repetition,
@@ -90,7 +90,7 @@ class Column:
         return np.array(halves)[places.ravel()]
 
     def _half(self, stable: np.ndarray, tries: np.ndarray) -> float:
-        """Return the K at which the curve passes one half: 0 if it does so below the first wall that was hit."""
+        """Return the K at which the curve passes one half: 0 if this is below the first wall hit."""
         some = tries > 0
         if not some.any():
             return 0.0

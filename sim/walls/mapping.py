@@ -1,8 +1,8 @@
 """Maps of stable walls, and who makes them for a study.
 
-A map asks for one wall at a time, and all starts of a wall are hit side by side, as are walls of different maps; every
-verdict is kept as it comes. A verdict depends on the scene, the wall and the start alone, so the map is the same for
-any pool, and an interrupted map continues where it was, also with more starts.
+A map asks for one wall at a time. All starts of a wall are hit side by side, as are walls of different maps; every
+verdict is kept as it comes. A verdict depends on the scene, the wall and the start alone. So the map is the same for
+any pool. An interrupted map continues where it was, also with more starts.
 """
 
 import platform
@@ -37,7 +37,7 @@ class Effort(NamedTuple):
 
 
 class Mapper:
-    """What makes the maps of a study, and records their effort from its own beginning on.
+    """The maker of a study's maps; it records their effort from its own beginning on.
 
     Args:
         backend: one of `backends.BACKENDS`.
@@ -103,14 +103,16 @@ def verdict(
         RuntimeError: if the worker has other sources of the project.
     """
     if sources != store.sources():
-        raise RuntimeError(f"a worker, {platform.node()}, has other sources of hardwall, or versions of its tools")
+        raise RuntimeError(
+            f"a worker, {platform.node()}, has other sources of hardwall, or other versions of its tools"
+        )
     case, start = Case("", scene, text, changes), None if start is None else start_of(start)
     result = hit.run(case.hitting(*wall, start), backend, until_sure=True)
     if not result.touched:
         stiffness, damping = wall
         held = "" if case.scene.coupling is None else ", for its coupling holds it back or shakes it"
         raise NeverReached(
-            f"the handle did not reach the wall{held}: nothing is said of K {stiffness:g}, B {damping:g} "
+            f"the handle did not reach the wall{held}: no verdict on the wall K {stiffness:g}, B {damping:g} "
             f"with {case.scene.controller.estimator}"
         )
     return {
@@ -127,8 +129,8 @@ def verdict(
 class _Mapping:
     """A map in progress: the jobs that it asks for next, by variant and start, and at the end the map.
 
-    Every wall is hit in all variants of the case. The search is sent the verdicts of the worst of them so far, and the
-    map is of the walls as the worst variant had them.
+    Every wall is hit in all variants of the case. The search gets the verdicts of the worst variant so far. The map has
+    each wall's verdicts by its worst variant.
     """
 
     def __init__(self, case: Case, backend: str, starts: int):
@@ -145,7 +147,7 @@ class _Mapping:
 
     @property
     def of_variants(self) -> bool:
-        """Whether it is of a case that has variants, whose hits other maps may have had."""
+        """Whether its case has variants; other maps may already have their hits."""
         return len(self._jobs) > 1
 
     def answer(self, place: tuple[str, int], result: dict) -> None:

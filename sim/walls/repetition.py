@@ -1,13 +1,13 @@
-"""Whether a closed loop provably repeats: all that its future depends on is what it was before.
+"""Whether a closed loop provably repeats: everything that determines its future equals an earlier state.
 
 The loop is a function: plant, encoder, drives on their way and controller after a sample follow from those before it,
 and from nothing else. Time enters by differences alone. So a loop that is in one state twice goes through all states in
-between for ever, and if the handle did not move in between it never will. Equal is exact: no digit of any number
-differs.
+between for ever. If the handle did not move in between, it never will. Equal is exact: no digit of any number differs.
 
-What is left out is what no such future sees: the stamps of edges, if the estimator looks at none, and the number of the
-sample, which the clock of the decoder must be in step with. Some loops are never said to repeat: hardware, whose state
-is its own, estimators that look at stamps, encoders whose lines take time, and pulses of a carrier.
+Two things are left out, because no such future sees them: the stamps of edges, if the estimator uses none; and the
+number of the sample, with which the clock of the decoder must be in step. Some loops never count as repeating:
+hardware, because its state is hidden; estimators that use stamps; encoders whose lines take time; and pulses of a
+carrier.
 """
 
 import math
@@ -25,7 +25,8 @@ PERIOD = 2520
 
 
 def period_of(scene: Scene, world: World, state: Any) -> int | None:
-    """Return the number of samples after which a resting loop of a scene is as before; None if that cannot be seen."""
+    """Return the number of samples after which a resting loop of a scene is as before; None if this cannot be
+    determined."""
     pulse = getattr(world.plant, "pulse", None)
     own = state.controller if isinstance(state, CoupledState) else state
     if not isinstance(own, State) or scene.spec.design.estimator.uses_stamps() or (pulse and pulse.period):

@@ -1,9 +1,9 @@
 """Starts of a hit that differ by chance alone: the place in a count, and the phase of the push in the force's period.
 
-Nobody who builds a device chooses either, and a verdict may depend on them. A start has a number; its place and phase
-are uniform, and follow from the number alone: so all methods, and all walls of a map, have the same starts, and what
-two methods differ by is not the luck of their starts. The mass, or the seed of an encoder's errors, is none of this:
-they are keys of the scene.
+Nobody who builds a device chooses either, and a verdict may depend on them. A start has a number. Its place and phase
+are uniform, and follow from the number alone. So all methods, and all walls of a map, have the same starts, and two
+methods do not differ by the luck of their starts. The mass, or the seed of an encoder's errors, is none of this: they
+are keys of the scene.
 """
 
 from typing import NamedTuple

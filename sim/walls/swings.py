@@ -8,7 +8,7 @@ from ...model.runtime.compiled import compiled
 
 
 class Swings(NamedTuple):
-    """What is known of the swings of positions so far.
+    """The swings of positions so far.
 
     Attributes:
         turns: how often the position turned round.

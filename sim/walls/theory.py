@@ -1,13 +1,14 @@
 """The largest stiffness in theory: two bounds for passivity, and the exact boundary of the linear loop.
 
-- Colgate and Schenkel: a wall of K and B sampled every T, with its force d periods late, is passive on a rigid handle
-  if at every angle a = w T, b > K T / 2 sin((d + 1/2) a) / sin(a / 2) - B cos((d + 1) a): for d = 0, b > K T / 2 + |B|.
-  The condition is theirs for a plain difference at the force's rate; a fractional d lies between its neighbours.
+- Colgate and Schenkel: let a wall of K and B be sampled every T, with its force d periods late. It is passive on a
+  rigid handle under this condition at every angle a = w T: b > K T / 2 sin((d + 1/2) a) / sin(a / 2) - B cos((d + 1)
+  a). For d = 0 this is b > K T / 2 + |B|. The condition is theirs for a plain difference at the force's rate; a
+  fractional d lies between its neighbours.
 - Abbott and Okamura: with B = 0, position quantised to q and Coulomb friction f_c, passive if also K <= 2 f_c / q.
 - Linear: in contact, without sticking friction, limits, quantisation and a carrier's pulses, the loop with a linear
   estimator is linear and periodic with the force's update. It is stable while every eigenvalue of the state's change
   over a period is within the unit circle. Nothing else is left out: the zero-order hold, the clocks from strobe to
-  drive, the clocks of the decoder, amplifier, motor and its shunt, cable and hand, and the estimator are all in it.
+  drive, the clocks of the decoder, and the estimator; amplifier, motor and its shunt, cable and hand.
 
 The first two are for a rigid handle. A passive wall is stable with any hand, so these bounds lie below the linear
 boundary without a hand.
@@ -61,7 +62,8 @@ def held(scene: Scene, frequency_hz: float) -> complex:
 
 
 def impedance_n_per_m(scene: Scene, frequency_hz: float, exact: bool = False) -> complex:
-    """Return what a scene's wall renders of itself to a handle that moves sinusoidally: K_r + j w B_r, N/m.
+    """Return the stiffness and damping that a scene's wall renders to a handle in sinusoidal motion: K_r + j w B_r,
+    N/m.
 
     The commanded K + j w B, its damper behind the estimator, and all of it late and held. Counts are as fine as can be.
 
@@ -116,9 +118,9 @@ def _device(scene: Scene) -> Device:
 class Loop:
     """The linear loop of a scene in contact, over one update period of the force.
 
-    The state is taken at the instant that the count of a sample stands for. It holds the device's state
-    (`device.equations`), the command to it (N), the current drive (N), the drives on their way through the amplifier,
-    and the estimator's state.
+    The state is taken at the instant that the count of a sample stands for. It holds the device's state (`plant`), the
+    command to it (N), the current drive (N), and the drives on their way through the amplifier. It also holds the
+    estimator's state.
 
     Raises:
         ValueError: if the estimator is not linear.
@@ -182,8 +184,9 @@ def linear_limit_n_per_m(loop: Loop, damping_n_s_per_m: float) -> float:
         damping_n_s_per_m: damping of the wall.
 
     Returns:
-        That stiffness, refined between two neighbours of a search: stable islands above it, and unstable islands
-        between two neighbours, are not searched for. 0 if even the least is unstable, infinite if none is found.
+        That stiffness, refined between two neighbours of a search. Stable islands above it, and unstable islands
+        between two neighbours, are not searched for. It is 0 if even the least is unstable, infinite if no unstable one
+        is found.
     """
     stable = SEARCHED_N_PER_M[0]
     for stiffness in SEARCHED_N_PER_M:

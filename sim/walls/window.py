@@ -52,7 +52,7 @@ class Window:
         self.added += len(off)
 
     def joined(self, after: "Window") -> "Window":
-        """Return one window of the samples of this one and those of the window behind it."""
+        """Return one window of the samples of this window and of the next one."""
         both, way = Window(self.samples + after.samples, self._room), after._first_m - self._first_m
         moved = after._sum + after.samples * way
         both.added, both._first_m, both._sum = both.samples, self._first_m, self._sum + moved

@@ -1,8 +1,8 @@
-"""The worst of several variants of a case, such as the hands that may hold a handle: at every wall the variant in which
-the fewest hits are stable.
+"""The worst of several variants of a case, for instance of several hands on the handle: at every wall, the variant with
+the fewest stable hits.
 
-All variants hit a wall from the same starts. A map of the worst case is a map like others, of walls that each have the
-verdicts of their worst variant: its boundary is the K at which the least P(stable) over the variants passes one half.
+All variants hit a wall from the same starts. A map of the worst case is an ordinary map: each wall has the verdicts of
+its worst variant. So its boundary is the K at which the least P(stable) over the variants passes one half.
 """
 
 from collections.abc import Sequence
@@ -54,14 +54,14 @@ def cases_of(case: Case, hands: Sequence[str]) -> list[Case]:
 
 
 def of(walls: dict[str, Wall]) -> list[str]:
-    """Return the variants, by name, in which the fewest hits of a wall are stable: all that have as few."""
+    """Return the names of the variants with the fewest stable hits of a wall; several if they are equal."""
     least = min(wall.share for wall in walls.values())
     return [name for name, wall in walls.items() if wall.share == least]
 
 
 def report(variants: dict[str, tuple[Wall, ...]], boundary: list[BoundaryPoint]) -> dict[str, Any]:
-    """Return what a report says of a worst case: the names of the variants, and those that are worst at every point of
-    the boundary, and at every wall of `p_stable`."""
+    """Return the report of a worst case: the names of the variants, and the worst ones at every point of the boundary
+    and at every wall of `p_stable`."""
     return {
         "hands": list(variants),
         "worst_of_boundary": [at_edge(variants, point) for point in boundary],
@@ -83,7 +83,7 @@ def at_edge(variants: dict[str, tuple[Wall, ...]], point: BoundaryPoint) -> list
 
 
 def told(variants: dict[str, tuple[Wall, ...]], boundary: list[BoundaryPoint]) -> str:
-    """Return in words which variant is the worst at which B; nothing of a case without variants."""
+    """Return in words the worst variant at each B; empty for a case without variants."""
     if not variants:
         return ""
     stretches: list[tuple[str, list[float]]] = []

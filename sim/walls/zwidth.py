@@ -129,9 +129,10 @@ class Map:
     def report(self) -> dict[str, Any]:
         """Return the map as the command line prints it.
 
-        The boundary is a list of [B (N s/m), K (N/m), low, high]: the K at which a hit is as likely stable as not, and
-        the ends of its interval; the true K is larger where the boundary leaves the map. `p_stable` is a list of [B, K,
-        stable, unstable, undecided], the numbers of hits. A worst case also has what `worst_variant.report` says.
+        The boundary is a list of [B (N s/m), K (N/m), low, high]. K is the stiffness at which a hit is as likely stable
+        as not; low and high are the ends of its interval. The true K is larger where the boundary leaves the map.
+        `p_stable` is a list of [B, K, stable, unstable, undecided], the numbers of hits. A worst case also has what
+        `worst_variant.report` says.
         """
         low, high = self.area_interval
         return {

@@ -7,26 +7,26 @@ the Coulomb level Fc, the static level Fs, the Stribeck speed vs, and with s = s
     g(v) = Fc + (Fs - Fc) exp(-(v / vs)^2)
 
 Dahl's model has g = Fc and D = 0. While v keeps its sign and the applied force F is constant, all of it is analytic. So
-a leg of h seconds is a power series in the time t / h, whose terms up to an order N are computed by recurrence. LuGre's
-exponential f = exp(-(v / vs)^2) is one more state, df/dt = -(2 / vs^2) v (dv/dt) f, so that the rest are products and
-the quotient 1 / g.
+a leg of h seconds is a power series in the time t / h. Its terms up to an order N are computed by recurrence. LuGre's
+exponential f = exp(-(v / vs)^2) is one more state, df/dt = -(2 / vs^2) v (dv/dt) f. The rest are products and the
+quotient 1 / g.
 
 **What the series leave out.** The size |A| of a series is the sum of the magnitudes of its terms. No value of it on the
 leg is larger, and |A B| <= |A| |B|. Let the terms beyond order N of v, z and f have sizes rv, rz and rf, and carry them
-through the right sides: the rest of a product A B beyond N is at most
+through the right sides. The rest of a product A B beyond N is at most
 
     sum of |A_i B_j| over i + j > N,  + |A| rB + rA |B| + rA rB,
 
-and if Q are the first terms of 1 / g, and e is the rest of g Q beyond N, that of 1 / g is at most |Q| e / (1 - e). An
+Let Q be the first terms of 1 / g, and e the rest of g Q beyond N. Then the rest of 1 / g is at most |Q| e / (1 - e). An
 integral divides a term of order N or more by N + 1 at least. Hence, where a right side has a last term p_N, and rp is
 the rest that follows for it from rv, rz and rf,
 
     h (|p_N| + rp) / (N + 1) <= the rest that was assumed of the state                                        (1)
 
-shows, for all states at once, that no rest is larger than assumed: each term follows from those before it, so if the
-rests up to any order are within the assumed, (1) says the same with one order more. `fits` checks (1) for what double
-precision rounds off anyway: `UNIT` of the sizes of z, of f, and of v and the velocity that the forces give in the leg.
-A leg for which (1) fails is tried again with more terms, or with half its length.
+shows, for all states at once, that no rest is larger than assumed. Each term follows from the terms before it. So if
+the rests up to any order are within the assumed bounds, (1) gives the same for one order more. `fits` checks (1) for
+what double precision rounds off anyway: `UNIT` of the sizes of z, of f, and of v and the velocity that the forces give
+in the leg. If (1) fails for a leg, the leg is tried again with more terms, or with half its length.
 """
 
 import math
@@ -125,7 +125,7 @@ def fits(plant, terms, seconds, order, rub_rest, rests):
         plant, seconds, order: as in `expand`.
         terms: the plant's.
         rub_rest: the rest of v z / g.
-        rests: those that are assumed of v and z.
+        rests: the assumed ones of v and z.
     """
     v, z = rests
     rate = v + plant.stiffness_n_per_m * rub_rest

@@ -1,8 +1,8 @@
 """Random numbers that are functions of a seed and of two whole numbers: nothing is kept from one to the next.
 
-A number that is asked for again is the same again, and one in the middle of a long row costs no more than the first.
-The words are mixed by multiplications and shifts of 32 bits (see `mixed`), computed in 64 so that compiled code and
-plain Python agree.
+A number asked for again is the same again. One in the middle of a long row costs no more than the first. The words are
+mixed by multiplications and shifts of 32 bits (see `mixed`), computed in 64 so that compiled code and plain Python
+agree.
 """
 
 import math
@@ -49,7 +49,7 @@ def uniform(seed, stream, first, second):
 def normal(seed, stream, first, second):
     """Return the random number of two whole numbers, normally distributed with mean 0 and sigma 1.
 
-    It is that of Box and Muller, from two words: no number is more than 6.8 sigma from 0.
+    The method is Box and Muller's, from two words: no number is more than 6.8 sigma from 0.
     """
     word = word_of(seed, stream, first, second)
     other = mixed(word ^ GOLDEN)

@@ -7,15 +7,15 @@ kf = Kt / r.
 - Amplifier: |u| <= kf I. With a bandwidth w (1/s), df/dt = w (u - f). With neither a bandwidth nor a motor, f = u.
 - Motor: its resistance is R, its inductance L, its voltage limit V and its force f. A voltage is given as the force
   that it would hold at standstill, e = kf V / R; with the motor's speed vm, L/R df/dt = e - f - (kf^2 / R) vm. An
-  amplifier with a bandwidth is a current loop that asks for the e that makes df/dt = w (u - f), and gets no more than
+  amplifier with a bandwidth is a current loop. It asks for the e that makes df/dt = w (u - f), and gets no more than
   its limit. An amplifier without a bandwidth asks for e = u at any current: a voltage drive, damped by the motor.
 - Shunt: a resistor Rd, alone or in series with a capacitor C, across the terminals of a motor with a current loop. The
   motor's own voltage drives a current through it, and that damps. With h its current (as a force of the motor) and q
   the capacitor's voltage (as a force at standstill; 0 without one), e = q + (Rd / R) h and dq/dt = h / (R C). The loop
   makes f + h = g r, dr/dt = w (u - r), where g = 1 + R / Rd without a capacitor, else 1: u is the force at standstill,
   and |u| <= kf I / g. Where that takes more than the voltage's limit, e is at the limit, and h is what e makes it.
-  Within the limit the motor's side meets the damping kf^2 / Z, whatever u is, with Z = R + Rd + s L + 1 / (s C), and f
-  is g (Rd + 1 / (s C)) / Z times r. With a capacitor there is hardly any damping below the corner 1 / ((R + Rd) C).
+  Within the limit the motor's side meets the damping kf^2 / Z, whatever u is, with Z = R + Rd + s L + 1 / (s C). f is
+  then g (Rd + 1 / (s C)) / Z times r. With a capacitor there is hardly any damping below the corner 1 / ((R + Rd) C).
 - Transmission: a cable of stiffness k and damping d. The motor's side is a separate mass: with s its position less the
   handle's, and w = ds/dt, mm d(v + w)/dt = f - c - bm (v + w), c = k s + d w. Without a transmission c = f.
 - Hand: a mass that moves with the handle, held by a spring and a damper, with the force kh (rest - x) - bh v.
@@ -88,11 +88,11 @@ class Shunt:
 
     @property
     def states(self) -> int:
-        """Number of states that it adds: the command that the loop has reached, and the capacitor's voltage."""
+        """Number of states that it adds: the command reached by the loop, and the capacitor's voltage."""
         return 2 if self.capacitance_f else 1
 
     def amplified(self, motor: Motor) -> float:
-        """Return the amplifier's current over that of a motor at standstill."""
+        """Return the amplifier's current relative to the current of a motor at standstill."""
         return 1.0 if self.capacitance_f else 1.0 + motor.resistance_ohm / self.resistance_ohm
 
 
@@ -267,7 +267,7 @@ def train(device: Device, longest_s: float) -> Train:
         rest = reach**order / math.factorial(order + 1) / (1 - LEG_RATE / 2)
     free = equations(device)
     n = len(free.rates)
-    # Room for states that it lacks is within the tables, and that for more states behind them.
+    # The tables have room inside for states that it lacks, and room at the end for more states.
     extra = EXTRA if n > STATES else 0
     rows, places = ([*range(STATES), *range(first, first + EXTRA)][:n] for first in (QUANTITIES, COLUMNS))
     columns = [*places, ONE, COMMAND]

@@ -1,18 +1,17 @@
 """An incremental encoder in quadrature, from exact motion to clock-stamped edges.
 
-Edge n stands at (n + offset[n mod 4]) counts, and cell n is the half-open stretch from edge n to edge n + 1. Moving
-up, edge n raises A, raises B, lowers A, lowers B for n mod 4 = 0, 1, 2, 3, so the levels (A, B) go
-00 -> 10 -> 11 -> 01 -> 00 and each edge is one count of +1; a count's number is the number of its cell. The offsets
-are the errors of a real scale: B out of its quarter period (phase), and high longer than low (duty). A `Scale` has the
-errors that do not repeat every four edges, and `Lines` what happens on the way to the pins; None is neither, and then
-nothing of them is compiled.
+Edge n stands at (n + offset[n mod 4]) counts, and cell n is the half-open stretch from edge n to edge n + 1. Moving up,
+edge n raises A, raises B, lowers A, lowers B for n mod 4 = 0, 1, 2, 3. So the levels (A, B) go 00 -> 10 -> 11 -> 01 ->
+00, and each edge is one count of +1. A count's number is the number of its cell. The offsets are the errors of a real
+scale: B out of its quarter period (phase), and high longer than low (duty). A `Scale` has the errors that do not repeat
+every four edges. `Lines` has the effects on the way to the pins. None means neither; then nothing of them is compiled.
 
 An edge carries the number of the clock at which a register at the pin first holds the new level. At clock n the
-register sees the position at time n / clock_hz, so an edge passed at time t upwards is stamped ceil(t clock_hz), and
-downwards floor(t clock_hz) + 1: at the very edge the position belongs to the upper cell.
+register sees the position at time n / clock_hz. So an edge passed at time t upwards is stamped ceil(t clock_hz), and
+downwards floor(t clock_hz) + 1: exactly at the edge the position belongs to the upper cell.
 
-With hysteresis h cell n begins h/2 below its lower edge and ends h/2 above its upper one: cells overlap, and the one
-that the handle is in is left at an end of it.
+With hysteresis h, cell n begins h/2 below its lower edge and ends h/2 above its upper one. So cells overlap, and the
+handle leaves its present cell at an end of that cell.
 """
 
 import math
@@ -132,7 +131,7 @@ def _cell(encoder, number):
 
 @compiled
 def locate(encoder, position_m):
-    """Return the `Cell` that holds a position; with hysteresis, the one that would hold it without."""
+    """Return the `Cell` that holds a position, without regard to hysteresis."""
     return _cell(encoder, _number(encoder, position_m))
 
 
@@ -156,9 +155,9 @@ def numbers_from(encoder, cell, positions):
 
 @compiled
 def number_at(encoder, positions):
-    """Return the numbers of the cells that hold an array of positions (m): the counts that an encoder has there.
+    """Return the numbers of the cells at an array of positions (m): an encoder's counts there.
 
-    With hysteresis the positions are met in this order, and the first cell is the one that would hold it without.
+    With hysteresis the positions are met in this order; the first cell is found without hysteresis.
     """
     return numbers_from(encoder, locate(encoder, positions[0] if len(positions) else 0.0), positions)
 
@@ -196,7 +195,7 @@ def _clamped(lines, clock, clocks):
 
 @compiled
 def stamp(encoder, cell, upwards, at_s, interval):
-    """Return the clock at which the pins show that a cell is left upwards or downwards, `at_s` into an interval.
+    """Return the clock at which the pins change as a cell is left upwards or downwards, `at_s` into an interval.
 
     It is within the interval, unless the encoder has lines, which show edges later: `lines.carry` puts them in order.
     """

@@ -3,14 +3,14 @@
 It uses the same tables in steps of `step_s`; the last step before the command changes is the rest of the interval:
 
 - velocities, the motor's force, and what its shunt adds, change by their rates at the beginning of the step;
-- positions change linearly by the new velocities, and edges are passed where that line passes them (stamping all edges
-  at the step's end would be an illegal transition of the pins for a handle that passes two in a step);
+- positions change linearly by the new velocities, and edges are passed on that line; otherwise a handle that passes two
+  edges in a step would make an illegal transition of the pins;
 - Coulomb friction is clamped: where a step would turn the handle, and friction could hold it, the handle rests; it
   breaks loose in the first step whose force exceeds friction;
 - the voltage is within its limits, or at one of them, for a whole step.
 
 The error is of the order of a step. A scene may not have steps in which the device itself diverges (`longest_s`). In
-shorter steps a limited force moves the device by a bounded amount, so that a run has numbers to its end and an unstable
+shorter steps a limited force moves the device by a bounded amount. So a run stays finite until it ends, and an unstable
 wall gets its verdict, as with the other solvers.
 """
 
@@ -104,7 +104,7 @@ def longest_s(device: Device, most_s: float) -> float:
 
 @compiled
 def _more_stepped(plant, phase, state, more, command_n, seconds):
-    """Return `more`, that of the state, after one step; None if there is none."""
+    """Return `more` of the state after one step; None if there is none."""
     if more is None:
         return more
     first = more[0] + seconds * quantity(plant.tables, phase, QUANTITIES, state, command_n)

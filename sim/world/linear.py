@@ -1,4 +1,4 @@
-"""Devices whose state has a rate of change that is linear in the state and the command, in each of nine phases.
+"""Devices with linear dynamics in the state and the command, in each of nine phases.
 
 A phase combines the handle (sliding up, sliding down or stuck) with the voltage (within its limits, or at one of them).
 `taylor` and `euler` both solve such a device from the same tables, and share the code of this file. An interval is one
@@ -15,12 +15,12 @@ from .converter import width_of
 
 PHASES = 9
 STATES = 5
-"""Number of states that the tables have room for; known when compiling, so that loops over them are unrolled."""
+"""Number of states in the tables; known when compiling, so that loops over them are unrolled."""
 SEEN, GRIP, VOLTAGE, QUANTITIES = 5, 6, 7, 8
 """The quantities after the state: the encoder's position, the one that decides on sticking, and the voltage; then the
 number of quantities."""
 ONE, COMMAND = 5, 6
-"""The columns after those of the state: of 1, and of the command."""
+"""The columns after the state's: of 1, and of the command."""
 EXTRA = 2
 """Number of states that a device may have beyond `STATES`; their rows are behind the quantities, and their columns
 behind the command's."""
@@ -54,7 +54,7 @@ STUCK, SLIDING = 4, 7  # phase_number(0, 0) and phase_number(1, 0), written out 
 
 @compiled
 def with_more(total, tables, phase, number, more):
-    """Return a sum of a quantity's terms with those of the states in `more`, if there are any."""
+    """Return the sum of a quantity's terms, including the terms of the states in `more`, if there are any."""
     if more is None:
         return total
     return total + tables[phase, number, COLUMNS] * more[0] + tables[phase, number, COLUMNS + 1] * more[1]

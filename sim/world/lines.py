@@ -1,7 +1,7 @@
 """The two lines from an encoder to the pins, and what happens to edges on them in time.
 
-An edge that the handle passes at time t is shown at t + late + jitter: the jitter is normally distributed and cut at
-4 sigma, and `late` is those 4 sigma, for no edge is shown before it is passed. Each line has its own order of edges. A
+An edge that the handle passes at time t is shown at t + late + jitter. The jitter is normally distributed and cut at 4
+sigma. `late` is these 4 sigma, because no edge is shown before it is passed. Each line has its own order of edges. A
 glitch is a pulse that turns one line over for its length; glitches come at random times, independently of each other. A
 line that dies keeps its level from then on.
 
@@ -10,7 +10,7 @@ edges are shown at least a separation apart. So several edges that are passed be
 
 Every change is a *toggle*: a clock and the line, 1 for A and 2 for B, whose level it turns over. So edges and glitches
 that overtake each other need no more than an order in time. `carry` gives a loop the toggles of one interval after the
-other, and `carried` those of a whole record.
+other, `carried` gives them for a whole record.
 """
 
 import math
@@ -27,11 +27,11 @@ JITTER, GAPS, CHANNELS = 2, 3, 4
 """The streams of random numbers: of the jitter, of the times between glitches, and of the lines that they are on."""
 A, B = 1, 2
 ROUNDING = 1e-6
-"""Clocks by which a product of a time and a clock may be above a whole number that it is meant to be."""
+"""The rounding error, in clocks, by which a product of a time and a clock may exceed its true whole number."""
 
 
 class Lines(NamedTuple):
-    """What happens on the lines; times in seconds, infinite for never."""
+    """The effects on the lines; times in seconds, infinite for never."""
 
     jitter_s: float  # sigma
     late_s: float
@@ -46,7 +46,7 @@ class Lines(NamedTuple):
 
 
 class Waiting(NamedTuple):
-    """What a loop keeps of its lines from interval to interval, in arrays that `carry` writes to."""
+    """A loop's state of its lines from interval to interval, in arrays that `carry` writes to."""
 
     edges: Edges  # those of the loop: in go the edges that the handle passes, out come those of the pins
     toggles: Edges  # the clocks and lines of the toggles to come, in order
@@ -66,8 +66,8 @@ def shown_s(lines, clock, number, upwards, at_s):
 
     Args:
         lines: the `Lines`; None for none, and the edge is shown as it is passed.
-        clock, number, upwards: from which clock on the time is counted, which edge it is, and in which direction it is
-            passed; the jitter is a function of the three.
+        clock, number, upwards: the clock from which the time is counted, the edge, and the direction of its passing;
+            the jitter is a function of all three.
         at_s: the time (s).
     """
     if lines is None:
@@ -126,7 +126,7 @@ def waiting(lines: Lines | None, level: int, edges: Edges) -> Waiting | None:
 
 @compiled
 def _insert(kept, clock, line):
-    """Put a toggle among those to come, behind those of its clock; return whether there was room."""
+    """Add a toggle to the coming ones, after the toggles of the same clock; return whether there was room."""
     clocks, lines, count = kept.toggles.clocks, kept.toggles.levels, kept.marks[PENDING]
     if count == len(clocks):
         return False
@@ -178,12 +178,12 @@ def _show(lines, kept, n_edges, until, clock_hz):
 
 @compiled
 def carry(lines, kept, before, n_edges, interval, clock_hz):
-    """Turn the edges that the handle passed in an interval into what the pins show up to its end.
+    """Turn the edges passed in an interval into the changes of the pins up to its end.
 
     Args:
         lines: the `Lines`.
         kept: the loop's `Waiting`.
-        before, n_edges: how many edges there were before the interval, and with those of the handle, which are
+        before, n_edges: the number of edges before the interval, and the number with the handle's edges, which are
             replaced.
         interval: the `Interval`.
         clock_hz: frequency of the clock.

@@ -3,14 +3,14 @@
 A leg has one direction of motion, and is one of two kinds.
 
 - *Full*: the bristles are bent as far as they can be at Coulomb's level. Then they do not change, friction is constant,
-  and `rigid` has the motion in closed form, up to the time at which the handle turns or, by LuGre's model, slips so
-  slowly that its level rises. At speed most of a run is of this kind, and passes without a series.
-- *Bending*: the series of `bristles`, up to the time at which the handle turns, or passes the speed at which the
-  level begins to be Coulomb's. The speed at which it ends to be is twice that, so that no leg begins where it must end:
-  from one to the other both are the same to rounding.
+  and `rigid` has the motion in closed form. It ends at the time at which the handle turns or, by LuGre's model, slips
+  so slowly that its level rises. At speed most of a run is of this kind, and passes without a series.
+- *Bending*: the series of `bristles`, up to the time at which the handle turns, or passes the speed at which the level
+  begins to be Coulomb's. The speed at which this ends is twice as large, so that no leg begins where it must end:
+  between the two speeds both motions are equal to rounding.
 
 Bristles never quite fill: the gap closes by 1 / e for each `full_m` that the handle slips. A gap within `FULL` of it is
-closed, which moves the friction by that part of Coulomb's level and no more.
+closed. This changes the friction by at most this fraction of Coulomb's level.
 
 A handle rests, and keeps its state bit for bit, only if its bristles bear the force exactly; else it swings on them.
 """
@@ -65,7 +65,7 @@ def bristled(
 
 
 def fastest_per_s(plant: Bristled) -> float:
-    """Return a bound on the rates that may hold on: those of a handle that sticks, or slips below `free_m_per_s`.
+    """Return a bound on the rates that can last: of a handle that sticks, or slips below `free_m_per_s`.
 
     Above, the bristles are full after a few dozen legs, and from then on the motion is known in closed form.
     """

@@ -2,15 +2,16 @@
 
     m dv/dt = F - b v - Fc sign(v),   dx/dt = v,   and v = 0 for as long as the handle rests and |F| <= Fc
 
-The applied force F is constant over an interval (zero-order hold), so the motion is known in closed form. With
-z = -b t / m, phi1(z) = (e^z - 1) / z and phi2(z) = (phi1(z) - 1) / z (the first columns of the matrix exponential),
-and `net` the force left after Coulomb friction,
+The applied force F is constant over an interval (zero-order hold), so the motion is known in closed form. Let z = -b t
+/ m, phi1(z) = (e^z - 1) / z and phi2(z) = (phi1(z) - 1) / z, the first columns of the matrix exponential. With `net`
+the force left after Coulomb friction,
 
     v(t) = v0 + v0 (e^z - 1) + net t phi1(z) / m
     x(t) = x0 + v0 t phi1(z) + net t^2 phi2(z) / m
 
 All terms of a row are computed to a few units in the last place for every z, b = 0 included. The velocity is monotone
-while `net` is constant, so an interval holds at most one turn (an instant of zero velocity), and its time is known too.
+while `net` is constant. So an interval holds at most one turn (an instant of zero velocity), and its time is known,
+too.
 
 Intervals of equal length share their coefficients: a `Span` is computed once, and only an interval that is cut by an
 event (a turn, an encoder edge) evaluates exponentials and logarithms. Stick and slip are events at their exact time,
@@ -75,8 +76,8 @@ class Span(NamedTuple):
 def span(handle, seconds):
     """Return the `Span` of `seconds` >= 0 of this handle.
 
-    Below |z| = 1/4 the difference in phi2 would cancel, so its Taylor series 2 phi2 = 1 + z/3 (1 + z/4 (1 + ...)) is
-    summed to where the next term is under 2**-53; and a short series serves the microseconds between events.
+    Below |z| = 1/4 the difference in phi2 would cancel. So its Taylor series 2 phi2 = 1 + z/3 (1 + z/4 (1 + ...)) is
+    summed until the next term is under 2**-53. A short series serves the microseconds between events.
     """
     z = -handle.viscous_n_s_per_m * seconds / handle.mass_kg
     if z > -0.25:
@@ -98,8 +99,8 @@ def span(handle, seconds):
 def glide(motion, net_n, interval):
     """Return the `Motion` after the span `interval` under a constant net force, also if the velocity passes zero.
 
-    The change of velocity is added to the old velocity: multiplying by e^z instead would repeat that factor's rounding
-    in every interval, a bias of the friction by up to 2**-53 / |z| of itself.
+    The change of velocity is added to the old velocity. Multiplying by e^z instead would repeat that factor's rounding
+    in every interval. This would bias the friction by up to 2**-53 / |z| of itself.
     """
     change = motion.velocity_m_per_s * interval.decay + net_n * interval.velocity_per_newton
     travel = motion.velocity_m_per_s * interval.coast_s + net_n * interval.position_per_newton
@@ -138,8 +139,8 @@ def turned(before, after):
 def turn(handle, motion, net_n, seconds):
     """Return the time (s) and the `Motion` at which the velocity reaches zero, for a motion that has `turned`.
 
-    v = 0 at t = (m / b) log(1 + b w) with w = -v0 / net; the time is held within 0 to `seconds`, the interval in which
-    the turn was found, against the rounding of either.
+    v = 0 at t = (m / b) log(1 + b w) with w = -v0 / net. The time is held within 0 to `seconds`, the interval in which
+    the turn was found, against rounding.
     """
     velocity = motion.velocity_m_per_s
     at = seconds

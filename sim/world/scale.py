@@ -1,8 +1,8 @@
-"""The errors of a scale beyond those of its four kinds of edges: where each edge really stands, and what holds it back.
+"""The errors of a scale besides its four kinds of edges: the true place of each edge, and its hysteresis.
 
-Edge n is displaced by a random amount of its own, which is a function of n and the seed, and by waves along the scale:
-errors that repeat every so many edges, such as those of an interpolator, or of a disk that is mounted out of its
-centre, once a turn. The random amounts are cut, so that each edge keeps its distance from the next: see `cut_of`.
+Edge n is displaced by its own random amount, a function of n and the seed, and by waves along the scale. A wave is an
+error that repeats every so many edges: of an interpolator, or, once a turn, of a disk that is mounted off its centre.
+The random amounts are cut, so that each edge keeps its distance from the next: see `cut_of`.
 
 Hysteresis moves all edges by half of itself in the direction of motion: after a turn the handle must come back by the
 whole of it before the pins change again.
@@ -47,8 +47,8 @@ class Scale(NamedTuple):
 def spread(wave: Wave) -> float:
     """Return how far, in counts, a wave moves edges against their neighbours: half the change of any level's length.
 
-    That is half of the most by which a level, of two counts, or the distance of two edges becomes longer or shorter:
-    what an error of each edge by so much would do, in any direction.
+    It is half of the largest change in the length of a level (two counts) or in the distance of two edges. Independent
+    errors of this size at each edge, in any direction, would do the same.
     """
     return abs(wave.counts) * max(abs(math.sin(math.pi / wave.edges)), abs(math.sin(math.tau / wave.edges)))
 
@@ -57,7 +57,7 @@ def cut_of(sigma: float, others: float) -> float:
     """Return the largest random displacement of an edge, counts: 4 sigma, or less where other errors leave no more.
 
     Args:
-        sigma: that of the random displacement, counts.
+        sigma: RMS of the random displacement, counts.
         others: how far all other errors move edges against their neighbours, counts.
     """
     return min(CUT_SIGMAS * sigma, MOST_COUNTS - others)
@@ -87,8 +87,7 @@ def displacement(scale, number):
 def near(scale, counts):
     """Return the number of an edge within a few of a place on the scale (counts), however far the waves carry edges.
 
-    A wave moves an edge by less than half of what it moves the neighbour from its own place, so that each step halves
-    the distance.
+    A wave moves an edge by less than half of the neighbour's displacement. So each step halves the distance.
     """
     number = math.floor(counts)
     for _ in range(SETTLED):

@@ -39,7 +39,7 @@ from .polynomials import FIRST, NEVER, UNSURE, at, leaves, measure, root, shorte
 HALVINGS = 40
 """Halvings of a leg after which the values at its ends alone decide: by then it is as short as rounding."""
 STALLED = 8
-"""Events in a row, each within `BRIEF` of the one before, after which a leg of that length passes without events."""
+"""After so many events in a row, each within `BRIEF` of the one before, a leg of that length passes without events."""
 BRIEF = 1e-6
 """The length of such a brief leg, as a part of the longest leg."""
 
@@ -79,7 +79,7 @@ def _more_at(series, time, more):
 
 @compiled
 def expand(tables, series, phase, state, more, command_n, seconds):
-    """Fill `series` with the polynomials of a leg in the time t / seconds, 0 to 1; `more` is that of the state."""
+    """Fill `series` with the polynomials of a leg in the time t / seconds, 0 to 1; `more` belongs to the state."""
     last, quantities = len(series) - 1, QUANTITIES
     if more is not None:
         quantities = QUANTITIES + EXTRA

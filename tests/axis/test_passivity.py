@@ -256,7 +256,7 @@ def test_an_axis_says_whether_it_has_a_controller():
     assert passive.design.flags == (*axis.design.flags, "passivity_active")
     with pytest.raises(TypeError, match=r"^passivity must be a bool, not 1$"):
         dataclasses.replace(axis, passivity=1)
-    with pytest.raises(ValueError, match=r"^passivity must be False, for axes that share their logic"):
+    with pytest.raises(ValueError, match=r"^passivity must be False: axes that share their logic"):
         AxesSpec(**NARROW, axes=2, estimator="fdm", passivity=True)
 
 

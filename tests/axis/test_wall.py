@@ -323,7 +323,7 @@ def test_gains_of_an_axis_that_are_too_small_are_refused_by_name():
 
 
 def test_several_axes_have_no_moving_surfaces():
-    with pytest.raises(ValueError, match=r"^coupling must be False, for axes that share their logic"):
+    with pytest.raises(ValueError, match=r"^coupling must be False: axes that share their logic"):
         AxesSpec(**NARROW, axes=2, estimator="fdm", coupling=True)
 
 

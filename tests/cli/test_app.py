@@ -110,7 +110,7 @@ def test_commands_that_speak_to_a_board_import_nothing_of_the_simulation():
 def test_a_command_that_speaks_to_a_board_needs_the_extra_host_alone(name):
     done = without(SIMULATING, name, *PORTS.get(name, ("nowhere",)))
     assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr.startswith("hardwall: error: nowhere cannot be opened: there is none of that name")
+    assert done.stderr.startswith("hardwall: error: nowhere cannot be opened: there is no such port")
 
 
 @pytest.mark.parametrize("name", OF_A_BOARD if LONG else OF_A_BOARD[:1])
@@ -258,5 +258,5 @@ def test_a_build_folder_that_cannot_be_is_refused_in_a_line():
     done = subprocess.run([str(HARDWALL), "hit", "mhz"], env=environ, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == (
-        "hardwall: error: HARDWALL_BUILD must not begin with a home that nobody has: '~nobody-of-this-name/x'\n"
+        "hardwall: error: HARDWALL_BUILD must not begin with the home of an unknown user: '~nobody-of-this-name/x'\n"
     )

@@ -108,8 +108,8 @@ OF_ONE_AXIS_ALONE = ("bench", "cutoff", "drop", "fit", "gains", "lipschitz", "ra
             "'no-such.json' must be a JSON report of `hardwall hit --json`, and is none: No such file",
         ),
         (["hit", "--beside", "no-such"], "scene must be one of "),
-        (["hit", "--beside", "eight-axes"], "--beside puts hits of one axis side by side, and eight-axes has several"),
-        (["hit", "eight-axes", "--beside", "mhz"], "side by side, and eight-axes has several"),
+        (["hit", "--beside", "eight-axes"], "--beside needs scenes of one axis: eight-axes has several"),
+        (["hit", "eight-axes", "--beside", "mhz"], "--beside needs scenes of one axis: eight-axes has several"),
         (["hit", "--beside", "mhz", "--trace", "a.npz"], "--trace must be absent with --beside"),
         (["hit", "--plot", "a.gif"], "--plot a.gif needs --beside: only hits side by side are drawn in motion"),
         (["rates", "--plot", "a.gif"], "--plot must end in .pdf or .png or .svg, not 'a.gif'"),
@@ -212,7 +212,10 @@ def test_several_axes_are_hit_and_have_rows_a_picture_and_traces(monkeypatch, ca
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["hit", "--backend", "rtl", "--trace", "x.fst"], "--trace x.fst is a waveform of one axis; the traces of sev"),
+        (
+            ["hit", "--backend", "rtl", "--trace", "x.fst"],
+            "--trace x.fst is a waveform of one axis: for a scene of sev",
+        ),
         (["hit", "--trace", "x.fst"], "--trace x.fst needs --backend rtl"),
         (["hit", "--estimator", "kalman"], "controller.estimator must be one of fdm, levant, window, not 'kalman'"),
         (

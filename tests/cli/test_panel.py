@@ -97,13 +97,13 @@ def test_a_board_that_starts_later_runs_the_scene_that_was_read(monkeypatch, cap
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
-        (["/dev/hardwall-absent"], 1, "cannot be opened: there is none of that name"),
+        (["/dev/hardwall-absent"], 1, "cannot be opened: there is no such port"),
         (["/dev/hardwall-absent", "mhz"], 2, "SCENE, --estimator and --set are for `hardwall panel virtual`"),
         (["virtual", "nowhere"], 2, "nowhere"),
         (["virtual", "--baud", "9600"], 2, "--baud and --pace are for a board at a port, not for `hardwall panel virt"),
         (["virtual", "--pace", "0.5"], 2, "--baud and --pace are for a board at a port, not for `hardwall panel virtu"),
-        (["/dev/hardwall-absent", "--new-token"], 2, "--new-token is for a page at a fixed port (--http) of this mach"),
-        (["virtual", "--host", "0.0.0.0", "--new-token"], 2, "--new-token is for a page at a fixed port (--http)"),
+        (["/dev/hardwall-absent", "--new-token"], 2, "--new-token needs a fixed port (--http) of this machine"),
+        (["virtual", "--host", "0.0.0.0", "--new-token"], 2, "--new-token needs a fixed port (--http)"),
         (["virtual", "--host", "nosuch.invalid"], 2, "--host must be an address of this machine, not 'nosuch.invalid'"),
         (["virtual", "--host", "192.0.2.1"], 2, "--host must be an address of this machine, not '192.0.2.1'"),
         (["virtual", "--host", "a" * 300], 2, "--host must be an address of this machine, not 'aaa"),

@@ -98,7 +98,7 @@ def test_arm_lasts_as_long_as_its_command(virtual, called, hangup_is_heard, numb
         # Another host cannot have the port meanwhile.
         busy = called("disarm", virtual.path)
         assert busy.returncode == 1
-        assert "another program has it, and a board has one host at a time" in busy.stderr
+        assert "another program uses it; `hardwall share` shares a board" in busy.stderr
         process.send_signal(signal.Signals[number])
         code, _, err = ended(process)
     assert code == CODES[signal.Signals[number]][0], err
@@ -149,7 +149,7 @@ def test_watch_shows_a_line_and_home_finds_the_index(virtual, called):
     done = called("home", virtual.path, "--seconds", "0.2")
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == (
-        "hardwall: error: in 0.2 s there was not the index: move the handle over it"
+        "hardwall: error: in 0.2 s the axis did not see the index: move the handle over it"
     )
     with started(HARDWALL, "home", virtual.path, "--at", "0.1", "--json", *AT) as process:
         assert process.stderr.readline() == "move the handle over its index\n"
@@ -180,11 +180,11 @@ def test_watch_shows_a_line_and_home_finds_the_index(virtual, called):
         (["watch", "PORT", "--seconds", "inf"], 2, "--seconds must be 0 to 1e+06 s, not inf"),
         (["capture", "PORT", "--trigger", "contact,noise"], 2, "--trigger must be of contact, trip, rise, fall, hand,"),
         (["capture", "PORT", "--before", "3000"], 2, "before must be 0 to 2047, not 3000"),
-        (["capture", "PORT", "--last", "--arm"], 2, "--last reads what is there: it goes with no word, --arm, "),
-        (["capture", "PORT", "--last", "--trigger", "trip"], 2, "--last reads what is there: it goes with no word, "),
+        (["capture", "PORT", "--last", "--arm"], 2, "--last reads a finished capture: no word, --arm, "),
+        (["capture", "PORT", "--last", "--trigger", "trip"], 2, "--last reads a finished capture: no word, "),
         (["capture", "PORT", "-o", "hit.csv"], 2, "--out must end in .npz, not 'hit.csv'"),
         (["connect", "PORT", "--identity", "no"], 1, "it has another bitstream"),
-        (["connect", "/dev/hardwall-absent"], 1, "cannot be opened: there is none of that name"),
+        (["connect", "/dev/hardwall-absent"], 1, "cannot be opened: there is no such port"),
     ],
 )
 def test_what_cannot_be_is_one_line(virtual, monkeypatch, capsys, words, code, message):

@@ -127,7 +127,7 @@ def test_who_holds_the_lease_is_shown_and_another_one_is_refused(virtual, monkey
         # The port itself is taken.
         code, _, err = call(monkeypatch, capsys, "connect", virtual.path, *AT)
         assert code == 1
-        assert "another program has it, and a board has one host at a time, unless `hardwall share`" in err
+        assert "another program uses it; `hardwall share` shares a board" in err
         # Any of them may disarm, and the program that armed ends.
         assert call(monkeypatch, capsys, "disarm", name, *AT)[0] == 0
         code, _, err = ended(programs["arm"])
@@ -141,8 +141,8 @@ def test_what_cannot_be_is_one_line(virtual, monkeypatch, capsys):
     with shared(virtual) as (_, name):
         number = name.rpartition(":")[2]
         for words, code, said in (
-            (["/dev/hardwall-absent"], 1, "cannot be opened: there is none of that name"),
-            ([name, "--tcp", number], 1, f"port {number} of 127.0.0.1 cannot be had: Address already in use"),
+            (["/dev/hardwall-absent"], 1, "cannot be opened: there is no such port"),
+            ([name, "--tcp", number], 1, f"port {number} of 127.0.0.1 cannot be opened: Address already in use"),
             ([name, "--seconds", "nan"], 2, "--seconds must be 0 to 1e+06 s, not nan"),
             ([name, "--tcp", "65536"], 2, "--tcp must be "),
             ([name, "--identity", "no"], 1, "it has another bitstream"),

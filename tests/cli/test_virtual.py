@@ -143,7 +143,7 @@ def test_a_port_that_is_taken_is_one_line(monkeypatch, capsys):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         code, _, err = call(monkeypatch, capsys, *command(CLOCK, "--tcp", str(port))[1:])
-    assert (code, err) == (1, f"hardwall: error: port {port} of 127.0.0.1 cannot be had: Address already in use\n")
+    assert (code, err) == (1, f"hardwall: error: port {port} of 127.0.0.1 cannot be opened: Address already in use\n")
 
 
 @pytest.mark.parametrize("name", ["virtual", "verilog", "synth"])

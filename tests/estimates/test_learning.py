@@ -52,7 +52,7 @@ def test_a_perfect_scale_has_no_errors_to_learn():
 @pytest.mark.parametrize(
     ("passes", "estimator", "backend", "message"),
     [
-        (1, "kalman", "float", "must be for edge-kalman, which takes a map, not for 'kalman'"),
+        (1, "kalman", "float", "must be for edge-kalman, which takes a map of the scale, not for 'kalman'"),
         (1, "edge-kalman", "rtl", "must be on float or fixed"),
         (0, "edge-kalman", "float", "must be a whole number from 1 to 100, not 0"),
         (2.5, "edge-kalman", "float", "must be a whole number from 1 to 100, not 2.5"),

@@ -168,7 +168,7 @@ def test_what_cannot_be_armed_says_why(virtual, axis):
 
 
 def test_the_index_becomes_the_origin(virtual, axis):
-    with pytest.raises(TimeoutError, match=r"in 0.2 s there was not the index: move the handle over it"):
+    with pytest.raises(TimeoutError, match=r"in 0.2 s the axis did not see the index: move the handle over it"):
         axis.home(seconds=0.2)
     # The hand holds it at places of the world, and there is an index every 4 mm. One that is found by chance, behind a
     # homing that did not end, is no reference.

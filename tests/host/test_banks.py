@@ -211,7 +211,7 @@ def test_a_capture_takes_the_axis_that_was_started(board, axes):
     assert board.started[0].items() >= {**wanted, "capture_level": -2000}.items()
     # For the others there is none: neither can they trigger it, nor read it.
     assert [axis.capture.state for axis in axes] == ["IDLE", "IDLE", "WAITING"]
-    with pytest.raises(NotReadyError, match="the capture is of axis 2, and not of axis 0"):
+    with pytest.raises(NotReadyError, match="the capture is of axis 2, not of axis 0"):
         axes[0].capture.trigger()
     axes[2].capture.trigger()
     assert axes[2].capture.state == "TRIGGERED"

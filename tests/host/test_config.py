@@ -170,9 +170,9 @@ def test_a_file_of_another_board_is_refused(file):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", r"must have the tables \[board\] and \[words\] alone"),
-        ("board = 1\nwords = 2", r"must have the tables \[board\] and \[words\] alone"),
-        ("[board]\n[words]\n[more]", r"must have the tables \[board\] and \[words\] alone"),
+        ("", r"must have only the tables \[board\] and \[words\]"),
+        ("board = 1\nwords = 2", r"must have only the tables \[board\] and \[words\]"),
+        ("[board]\n[words]\n[more]", r"must have only the tables \[board\] and \[words\]"),
         ("[board]\n[words]", r"\[board\] must have identity, clock_hz, .*, not \[\]"),
         ("[board", "is no TOML: "),
         ("x = " + "[" * 5000, "is no TOML: "),
@@ -208,7 +208,7 @@ def test_only_what_was_shown_is_loaded(board, file, axis):
     shown = config.differences(axis)
     axis.set(wall_damping=5.0)
     before = words_of(board)
-    with pytest.raises(ChangedError, match="others than those that were shown: nothing was loaded"):
+    with pytest.raises(ChangedError, match="have changed since they were shown: nothing was loaded"):
         config.load(axis, shown)
     with pytest.raises(ChangedError):
         config.load(axis, [])
@@ -240,7 +240,7 @@ def test_a_load_whose_commit_fails_leaves_what_was_before(board, file, axis, reg
         return answer
 
     board.server.take = take
-    with pytest.raises(HostError, match="nothing was loaded, for the board did not take all: the board refuses"):
+    with pytest.raises(HostError, match="nothing was loaded, because the board did not take all: the board refuses"):
         config.load(axis, differences)
     assert silent
     after = words_of(board)

@@ -54,7 +54,7 @@ def test_another_identity_than_the_wanted_is_refused(board, registers):
 
 def test_another_layout_is_refused(board):
     board.server.file.live[1] = 2
-    with pytest.raises(ForeignError, match="has the layout 2 of registers, and this version knows 1"):
+    with pytest.raises(ForeignError, match="has the register layout 2; this hardwall knows 1"):
         connect(board.name)
 
 
@@ -64,7 +64,7 @@ def test_another_vendor_is_refused(board, monkeypatch):
         key: end.replace(b"hardwall", b"softwall") for key, end in design.registers.identification.items()
     }
     monkeypatch.setattr(type(design.registers), "identification", identification)
-    with pytest.raises(ForeignError, match="is 'softwall', no hardwall"):
+    with pytest.raises(ForeignError, match="is 'softwall', not a hardwall board"):
         connect(board.name)
 
 

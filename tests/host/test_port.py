@@ -169,7 +169,7 @@ def test_a_host_begins_behind_what_the_last_one_was_told(board, registers):
         thread.start()
         port = Port(os.ttyname(theirs), answer_s=0.5)
         assert port.read(0, 2) == (0, registers["layout"].reset)
-        with pytest.raises(PortError, match="another program has it, and a board has one host at a time"):
+        with pytest.raises(PortError, match="another program uses it; `hardwall share` shares a board"):
             Port(os.ttyname(theirs))
         port.close()
         done.set()
@@ -240,7 +240,7 @@ def test_what_does_not_repeat_is_no_axis():
         thread = threading.Thread(target=answer)
         thread.start()
         port = Port(f"tcp://127.0.0.1:{server.getsockname()[1]}", answer_s=0.1)
-        with pytest.raises(ForeignError, match="does not repeat what it is told"):
+        with pytest.raises(ForeignError, match="does not echo a test request"):
             port.read(0, 2)
         port.close()
         thread.join()
@@ -297,7 +297,7 @@ def test_a_request_behind_the_close_is_an_error_of_the_port(port):
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("/dev/hardwall-absent", "there is none of that name; `ls /dev/serial/by-id` shows those"),
+        ("/dev/hardwall-absent", "there is no such port; `ls /dev/serial/by-id` lists the boards"),
         ("/dev/null", "it is no serial port"),
         ("/tmp", "/tmp cannot be opened: it is no serial port"),
         ("a" * 300, "cannot be opened: File name too long"),

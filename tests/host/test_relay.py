@@ -91,7 +91,9 @@ def test_who_leaves_lets_the_next_one_write(relay, come):
     first.close()
     wait_until(lambda: relay.holder == "")
     # What it read has changed since.
-    with pytest.raises(ChangedError, match=r"another program has written to the board at .* since this one came"):
+    with pytest.raises(
+        ChangedError, match=r"another program has written to the board at .* since this program connected"
+    ):
         before.set(wall_stiffness=2000.0)
     after = come()
     after.set(wall_stiffness=2000.0)
@@ -170,7 +172,7 @@ def test_a_configuration_is_not_loaded_beside_another_program(board, come, tmp_p
 def test_a_silent_board_is_silent_to_all_and_comes_back(board, come):
     reader = come()
     board.lost = FOR_GOOD
-    with pytest.raises(SilentError, match="nothing answers behind tcp://"):
+    with pytest.raises(SilentError, match="the board behind tcp://"):
         _ = reader.status
     board.lost = 0
     assert reader.status.state is State.DISARMED
@@ -435,7 +437,7 @@ def test_more_programs_than_it_takes_are_sent_away_if_all_are_busy(relay, monkey
 def test_a_port_of_the_loopback_that_is_taken_is_one_line(board, relay):
     with TwinBoard(board.server.file.design.registers) as other:
         number = int(relay.name.rpartition(":")[2])
-        with pytest.raises(PortError, match=f"port {number} of 127.0.0.1 cannot be had: Address already in use"):
+        with pytest.raises(PortError, match=f"port {number} of 127.0.0.1 cannot be opened: Address already in use"):
             share(other.name, **PATIENT, number=number)
         # The board is free again.
         connect(other.name, **PATIENT).close()

@@ -149,7 +149,7 @@ def test_a_reset_is_found_out_though_all_words_were_written_again(board, supervi
     axis.disarm()
     reset(board)
     supervised.heard.clear()
-    with pytest.raises(ChangedError, match="has not the last beat of this program: it was reset"):
+    with pytest.raises(ChangedError, match="does not have this program's last beat: it was reset"):
         axis.set(wall_stiffness=2e3)
     with pytest.raises(ChangedError):
         axis.arm()
@@ -160,7 +160,7 @@ def test_a_reset_is_found_out_though_all_words_were_written_again(board, supervi
 def test_a_reset_ends_the_heartbeat(board, axis):
     axis.renew()
     reset(board)
-    with pytest.raises(ChangedError, match="has not the last beat"):
+    with pytest.raises(ChangedError, match="does not have this program's last beat"):
         axis.sleep(PATIENCE_S)
     assert beats(board) == 0
 
@@ -187,7 +187,7 @@ def test_a_reset_behind_a_beat_whose_answer_was_lost_is_found_out(board, axis):
             reset(board)
 
     board.react = lose_it_and_reset
-    with pytest.raises(ChangedError, match="has not the last beat"):
+    with pytest.raises(ChangedError, match="does not have this program's last beat"):
         axis.renew()
     assert beats(board) == 0
 

@@ -191,7 +191,7 @@ def test_a_board_that_was_reset_is_not_armed(board, axis, registers):
     axis.set(wall_stiffness=5e3)
     at = registers["wall_stiffness"].address
     board.server.file.live[at : at + 2] = [0, 0]
-    with pytest.raises(ChangedError, match=r"has 0 in wall_stiffness, and not 5000 as it was written: it was reset"):
+    with pytest.raises(ChangedError, match=r"has 0 in wall_stiffness instead of the written 5000: it was reset"):
         axis.arm()
     board.server.file.live[3] ^= 1
     with pytest.raises(ChangedError, match=r"is now .*: connect again"):

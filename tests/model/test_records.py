@@ -58,7 +58,7 @@ def test_it_is_the_replays_velocity(estimator):
 def test_bounds_that_are_not_given_are_said():
     counts = np.floor(1000 * np.sin(np.arange(3000) / 100)).astype(np.int64)
     with pytest.warns(
-        RecordWarning, match=r"acceleration_max=[\d.e+-]+, speed_max=[\d.]+, travel=2048: from the record"
+        RecordWarning, match=r"acceleration_max=[\d.e+-]+, speed_max=[\d.]+, travel=2048: taken from the record"
     ) as said:
         made = velocity(counts, 1e3)
     assert len(said) == 1

@@ -88,7 +88,7 @@ def test_a_piece_of_a_counter_that_wraps_is_unwrapped(read):
 
 def test_a_gap_too_long_for_memory_is_refused(refused):
     lines = ["0.000,1", "0.001,1", "0.002,1", "90000.000,2"]
-    assert "must have at most 10000000 samples with those that are missing" in refused(lines, gaps="hold")
+    assert "must have at most 10000000 samples, missing ones included" in refused(lines, gaps="hold")
 
 
 def test_nothing_to_mend_changes_nothing(read):
@@ -125,7 +125,9 @@ def test_rounded_stamps_are_no_gaps(read, refused, rate, rule):
         assert len(found.counts) == (590 if rule == "split" and len(kept) < 1000 else 1000)
         assert found.counts[-1] == 999
         if rate < 990:  # else a piece has too few to tell
-            assert re.search(r"give the rate \(--rate [5-9]\d\d(\.\d+)?\), for", refused(coarse(rate, kept), gaps=rule))
+            assert re.search(
+                r"give the rate \(--rate [5-9]\d\d(\.\d+)?\), because", refused(coarse(rate, kept), gaps=rule)
+            )
 
 
 @pytest.mark.parametrize("lost", [1, 20])

@@ -49,7 +49,9 @@ def test_the_variable_may_begin_with_a_home(tmp_path, monkeypatch):
     monkeypatch.setenv("HARDWALL_BUILD", "~/x")
     assert build_dir() == tmp_path / "x"
     monkeypatch.setenv("HARDWALL_BUILD", "~nobody-of-this-name/x")
-    with pytest.raises(BuildFolderError, match=r"^HARDWALL_BUILD must not begin with a home that nobody has: '~nobody"):
+    with pytest.raises(
+        BuildFolderError, match=r"^HARDWALL_BUILD must not begin with the home of an unknown user: '~nobody"
+    ):
         build_dir()
 
 

@@ -118,7 +118,7 @@ def test_a_handle_that_never_comes_to_the_wall_proves_no_wall_stable():
         "changes": changes,
         "backend": "fixed",
     }
-    told = r"^the handle did not reach the wall: nothing is said of K 1000, B 10 with levant$"
+    told = r"^the handle did not reach the wall: no verdict on the wall K 1000, B 10 with levant$"
     with pytest.raises(RuntimeError, match=told):
         verdict(**job, wall=(1e3, 10.0), start=None)
 

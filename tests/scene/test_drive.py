@@ -75,8 +75,8 @@ def test_the_world_has_the_steps_of_the_stage():
         (DAC | {"drive.offset_v": 1.0}, "drive must have newtons_per_volt and full_scale_v, or"),
         (PWM | {"drive.pwm_hz": None}, "drive.pwm_hz is missing"),
         (DAC | {"drive.dac_bits": None}, "drive.dac_bits is missing"),
-        (PDM | {"drive.dac_mode": 1}, "drive.dac_mode must be absent, for drive.stage is pdm, not dac"),
-        (DAC | {"drive.dead_time_s": 1e-6}, "drive.dead_time_s must be absent, for drive.stage is dac, not pwm"),
+        (PDM | {"drive.dac_mode": 1}, "drive.dac_mode must be absent, because drive.stage is pdm, not dac"),
+        (DAC | {"drive.dead_time_s": 1e-6}, "drive.dead_time_s must be absent, because drive.stage is dac, not pwm"),
         (PWM | {"drive.stage": "relay"}, "drive.stage must be one of pdm, pwm, dac, not 'relay'"),
         (PWM | {"drive.pwm_hz": 60_001}, "drive.pwm_hz must be clock_hz 50000000 divided by a whole number from 8,"),
         (

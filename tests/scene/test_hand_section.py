@@ -45,7 +45,7 @@ def test_a_published_hand_moves_the_handle_as_the_linear_system_does(name):
         ({"hand.model": "nobody-1900"}, f"hand.model must be one of {', '.join(HANDS)}, not 'nobody-1900'"),
         (
             {"hand.model": "hogan-1989", "hand.mass_kg": 0.0},
-            "hand.mass_kg must be absent, for hand.model is hogan-1989, which has its own",
+            "hand.mass_kg must be absent, because hand.model is hogan-1989, which has its own",
         ),
         ({"hand.rest_m": 1e-3}, f"hand.mass_kg is missing: {NEEDED}, or is a published one by hand.model, one of"),
         (HAND | {"hand.damping_n_s_per_m": None}, f"hand.damping_n_s_per_m is missing: {NEEDED}, or is"),

@@ -40,7 +40,7 @@ def test_a_key_that_is_none_is_refused_whatever_its_value(key, value, said):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("name = 'mine'\n" + SEED, "name is not a key of a scene: its file has its name"),
+        ("name = 'mine'\n" + SEED, "name is not a key of a scene: the name of the file is the scene's name"),
         (SEED.replace("mass_kg = 0.35", f"mass_kg = {'9' * 5000}"), "must be a readable TOML file: Exceeds the limit"),
         (SEED.replace("mass_kg = 0.35", f"mass_kg = {'9' * 4000}"), "handle.mass_kg must be a number of 1e-06 to 1000"),
         (SEED.replace("1.0 ", "[" * 5000 + "1" + "]" * 5000), "must be a readable TOML file: it is nested too deeply"),

@@ -60,7 +60,7 @@ def test_bristles_are_never_swept_and_take_a_few_steps():
         (DAHL_KEYS | {"presliding.bristles": 1}, "presliding.bristles is not a key of a scene; its section has model"),
         *((LUGRE_KEYS | {f"presliding.{key}": None}, f"presliding.{key} is missing") for key in OF_LUGRE),
         *(
-            (DAHL_KEYS | {f"presliding.{key}": 1.0}, f"presliding.{key} must be absent, for presliding.model is dahl, ")
+            (DAHL_KEYS | {f"presliding.{key}": 1.0}, f"presliding.{key} must be absent, because presliding.model is ")
             for key in OF_LUGRE
         ),
         *(

@@ -150,10 +150,10 @@ def test_what_is_wrong_with_all_axes_names_none(text, said):
         (
             "axis.gripp.wall.damping_n_s_per_m",
             1.0,
-            "'axis.gripp.wall.damping_n_s_per_m' is of no axis of this scene: they",
+            "'axis.gripp.wall.damping_n_s_per_m' names no axis of this scene: its axes",
         ),
-        ("axis", 1.0, "'axis' is of no axis of this scene: they are base, shoulder"),
-        ("axis.grip", 1.0, "'axis.grip' must go on with the key of a scene"),
+        ("axis", 1.0, "'axis' names no axis of this scene: its axes are base, shoulder"),
+        ("axis.grip", 1.0, "'axis.grip' must be followed by a key of a scene"),
         ("axis.grip.wall.damping", 1.0, "axis grip: wall.damping is not a key of a scene; its section has stiff"),
         ("axis.grip.controller.clock_hz", 1, "axis grip: controller.clock_hz is shared by all axes"),
         ("controller.estimator", "kalman", "controller.estimator must be one of fdm, levant, window, not 'kalman'"),

@@ -142,8 +142,14 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     [
         (["mhz"], "mhz: zwidth is missing: a map needs its steps"),
         (["nothing"], f"scene must be one of {', '.join(names())}, or a .toml file, not 'nothing'"),
-        (["--set", "controller.estimator=fdm"], "--set 'controller.estimator' is what this command sets itself"),
-        (["--set", "wall.damping_n_s_per_m=1.0"], "--set 'wall.damping_n_s_per_m' is what this command sets itself"),
+        (
+            ["--set", "controller.estimator=fdm"],
+            "--set 'controller.estimator' must be absent (this command sets it)",
+        ),
+        (
+            ["--set", "wall.damping_n_s_per_m=1.0"],
+            "--set 'wall.damping_n_s_per_m' must be absent (this command sets it)",
+        ),
         (["--set", "handle.mass_kg=0"], "seed-2011: handle.mass_kg must be a number of 1e-06 to 1000, not 0"),
         (["--backend", "rtl"], "--backend must be one of float, fixed, not 'rtl'"),
         (["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "give it or --workers, not both"),

@@ -145,8 +145,14 @@ def test_agreement_leaves_out_what_has_no_end():
     [
         (["mhz"], "mhz: zwidth is missing: a map needs its steps"),
         (["--set", "handle.coulomb_n="], "seed-2011: handle.coulomb_n must be more than 0: no friction holds"),
-        (["--set", "controller.estimator=fdm"], "--set 'controller.estimator' is what this command sets itself"),
-        (["--set", "wall.damping_n_s_per_m=1.0"], "--set 'wall.damping_n_s_per_m' is what this command sets itself"),
+        (
+            ["--set", "controller.estimator=fdm"],
+            "--set 'controller.estimator' must be absent (this command sets it)",
+        ),
+        (
+            ["--set", "wall.damping_n_s_per_m=1.0"],
+            "--set 'wall.damping_n_s_per_m' must be absent (this command sets it)",
+        ),
         (["--backend", "rtl"], "--backend must be one of float, fixed, not 'rtl'"),
         (["--plot", "drop.gif"], "--plot must end in .pdf or .png or .svg"),
     ],

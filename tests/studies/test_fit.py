@@ -157,10 +157,13 @@ def test_report_and_table_and_what_is_known_is_not_hit_again(monkeypatch, capsys
     [
         (["mhz"], "mhz: amplifier.delay_s is missing: the search begins from it"),
         (["--axis", "1-10"], "--axis must be one of 3-30, 30-300, not '1-10'"),
-        (["--set", "controller.output=u1"], "--set 'controller.output' is what this command sets itself"),
+        (
+            ["--set", "controller.output=u1"],
+            "--set 'controller.output' must be absent (this command sets it)",
+        ),
         (
             ["--set", "zwidth.stiffness_step_n_per_m=123.0"],
-            "--set 'zwidth.stiffness_step_n_per_m' is what this command",
+            "--set 'zwidth.stiffness_step_n_per_m' must be absent (this command",
         ),
         (["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "give it or --workers, not both"),
     ],
@@ -187,7 +190,7 @@ def test_a_device_that_does_not_reach_the_wall_ends_no_search():
     class Rough(KnownDevice):
         def _map(self, case: Case) -> Map:
             if case.scene.handle.coulomb_n > 0.1:
-                raise NeverReached("the handle did not reach the wall: nothing is said of K 1000, B 3")
+                raise NeverReached("the handle did not reach the wall: no verdict on the wall K 1000, B 3")
             return super()._map(case)
 
     result = found(48, Rough())

@@ -167,7 +167,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
         (["mhz"], "mhz: zwidth is missing: a map needs its steps"),
         (
             ["--set", "controller.output=u1"],
-            "--set 'controller.output' is what this command sets itself: it is what is",
+            "--set 'controller.output' must be absent (this command sets it): it searches",
         ),
         (["--set", "encoder.count_m=0"], "seed-2011: encoder.count_m must be a number of 1e-12 to 1000, not 0"),
         (["--plot", "gains.gif"], "--plot must end in .pdf or .png or .svg"),

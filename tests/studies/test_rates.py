@@ -101,7 +101,7 @@ def test_report_and_picture(monkeypatch, capsys, tmp_path):
         (["--rates", "3e3"], "controller.sample_hz must divide clock_hz 50000000, not 3000"),
         (
             ["--set", "controller.sample_hz=1000"],
-            "--set 'controller.sample_hz' is what this command sets itself: see --rates",
+            "--set 'controller.sample_hz' must be absent (this command sets it): see --rates",
         ),
         (["--estimators", "nobody"], "--estimators: estimator must be one of fdm, "),
     ],

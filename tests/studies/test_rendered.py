@@ -221,7 +221,10 @@ def test_a_scene_that_lacks_parts_and_one_with_all_of_them_are_moved(monkeypatch
         (["--amplitude", "1"], "an amplitude of 1 mm at 400 Hz is a speed of 2.51327 m/s, which must be 0 to 2"),
         (["--window", "0"], "--window must be 0.01 to 100 ms, not 0.0"),
         (["--starts", "0"], "--starts must be a whole number of 1 to 10000, not '0'"),
-        (["--set", "controller.estimator=fdm"], "--set 'controller.estimator' is what this command sets itself: see"),
+        (
+            ["--set", "controller.estimator=fdm"],
+            "--set 'controller.estimator' must be absent (this command sets it): see",
+        ),
         (["--set", "wall.damping_n_s_per_m=-1"], "seed-2011: wall.damping_n_s_per_m must be"),
         (["--backend", "gpu"], "--backend must be one of float, fixed, rtl, not 'gpu'"),
         (["--plot", "a.gif"], "--plot must end in .pdf or .png or .svg"),

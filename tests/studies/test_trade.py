@@ -197,9 +197,15 @@ def test_a_scene_that_lacks_a_part_has_no_shortcut_without_it(hardware):
     ("arguments", "message"),
     [
         (["mhz"], "mhz: zwidth.stiffness_step_n_per_m is missing"),
-        (["--set", "solver.step_s=1e-5"], "--set 'solver.step_s' is what this command sets itself: it is one of the"),
-        (["--set", "controller.output=u1"], "--set 'controller.output' is what this command sets itself: it takes two"),
-        (["--starts", "4"], "--starts must be 5 or more, for fewer tell no move from chance, not 4"),
+        (
+            ["--set", "solver.step_s=1e-5"],
+            "--set 'solver.step_s' must be absent (this command sets it): it is one of the",
+        ),
+        (
+            ["--set", "controller.output=u1"],
+            "--set 'controller.output' must be absent (this command sets it): it takes two",
+        ),
+        (["--starts", "4"], "--starts must be 5 or more, because fewer cannot tell a move from chance, not 4"),
         (["--plot", "trade.gif"], "--plot must end in .pdf or .png or .svg"),
     ],
 )

@@ -118,7 +118,7 @@ def test_what_floods_the_terminal_is_lost(line):
 
 def test_a_port_that_is_taken_is_an_error(line):
     with pytest.raises(
-        PortError, match=rf"^port {line.tcp_port} of 127\.0\.0\.1 cannot be had: Address already in use$"
+        PortError, match=rf"^port {line.tcp_port} of 127\.0\.0\.1 cannot be opened: Address already in use$"
     ):
         Line(line.tcp_port)
 
@@ -128,7 +128,7 @@ def test_without_a_terminal_it_is_an_error_that_says_so(monkeypatch):
         raise OSError("out of pty devices")
 
     monkeypatch.setattr(pty, "openpty", none)
-    with pytest.raises(PortError, match=r"^there is no pseudo-terminal to be had: out of pty devices$"):
+    with pytest.raises(PortError, match=r"^no pseudo-terminal can be opened: out of pty devices$"):
         Line()
 
 

@@ -212,7 +212,7 @@ def test_a_hand_settles_where_it_holds():
 def test_an_output_of_its_own_is_refused():
     changes = {"output.dac_bits": 12, "output.full_scale_n": 20.0}
     with pytest.raises(
-        SceneError, match=r"^seed-2011: output must be absent, for the drive stage of the board is its output"
+        SceneError, match=r"^seed-2011: output must be absent, because the drive stage of the board is its output"
     ):
         VirtualBoard(load("seed-2011", changes))
 

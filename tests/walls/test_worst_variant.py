@@ -200,11 +200,11 @@ def test_the_table_says_which_hand_is_the_worst(case, asked):
         (["--hands", ""], f"--hands must be all, or some of none, {', '.join(HANDS)}, not ''"),
         (
             ["--hands", "all", "--set", "hand.model=hogan-1989"],
-            "--set 'hand.model' is what this command sets itself: see",
+            "--set 'hand.model' must be absent (this command sets it): see",
         ),
         (
             ["--hands", "none", "--set", "hand.mass_kg=0.1"],
-            "--set 'hand.mass_kg' is what this command sets itself: see",
+            "--set 'hand.mass_kg' must be absent (this command sets it): see",
         ),
         (
             ["--hands", "hogan-1989", "--set", "presliding.model=dahl", "--set", "presliding.stiffness_n_per_m=1e5"],

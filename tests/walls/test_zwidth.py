@@ -60,7 +60,7 @@ def map_of_one_thread(tmp_path_factory):
 
 
 def test_a_worker_with_other_sources_is_refused():
-    with pytest.raises(RuntimeError, match=r"has other sources of hardwall, or versions of its tools$"):
+    with pytest.raises(RuntimeError, match=r"has other sources of hardwall, or other versions of its tools$"):
         mapping.verdict("seed-2011", read("seed-2011"), "0", {}, (1e3, 10.0), None, "fixed")
 
 
@@ -230,8 +230,14 @@ def test_report_and_picture(monkeypatch, capsys, tmp_path, map_of_one_thread):
         ),
         (["--set", "zwidth.damping_step_n_s_per_m=1e-9"], "zwidth.damping_step_n_s_per_m must be at least 0.0294"),
         (["--set", "zwidth.stiffness_step_n_per_m=1e-3"], "zwidth.stiffness_step_n_per_m must be at least 10, 10000"),
-        (["--set", "controller.estimator=fdm"], "--set 'controller.estimator' is what this command sets itself: see"),
-        (["--set", "wall.damping_n_s_per_m=1.0"], "--set 'wall.damping_n_s_per_m' is what this command sets itself"),
+        (
+            ["--set", "controller.estimator=fdm"],
+            "--set 'controller.estimator' must be absent (this command sets it): see",
+        ),
+        (
+            ["--set", "wall.damping_n_s_per_m=1.0"],
+            "--set 'wall.damping_n_s_per_m' must be absent (this command sets it)",
+        ),
         (["--plot", "map.gif"], "--plot must end in .pdf or .png or .svg"),
     ],
 )

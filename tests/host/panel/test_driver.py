@@ -97,7 +97,7 @@ def test_a_tab_that_goes_disarms_what_it_armed_and_nothing_else(driver):
 def test_a_tab_that_is_not_heard_cannot_arm(driver, board):
     driver.arm(TAB)
     wait_until(lambda: driver.view.said)
-    assert driver.view.said == "the tab that asks to arm is not heard"
+    assert driver.view.said == "the tab that asks to arm does not answer"
     assert driver.view.status.state is State.DISARMED
 
 
@@ -139,7 +139,7 @@ def test_only_the_causes_that_a_tab_shows_are_acknowledged(driver, board):
     board.show(state=TRIPPED, latched=STOP | 1, first=STOP)
     wait_until(lambda: driver.view.status.trip)
     driver.acknowledge(STOP)
-    wait_until(lambda: "other causes stand" in driver.view.said)
+    wait_until(lambda: "the causes have changed since" in driver.view.said)
     assert driver.view.status.state is State.TRIPPED
     driver.acknowledge(STOP | 1)
     wait_until(lambda: driver.view.status.state is State.DISARMED)
@@ -225,7 +225,7 @@ def test_a_request_that_waits_for_its_board_does_not_go_out_late(driver, board, 
     """A board that falls silent just before a word is asked again, but not for as long as for a look."""
     monkeypatch.setattr("hardwall.host.panel.driver.DONE_S", 0.0)
     driver.set(TAB, "wall_stiffness", 900.0, time.monotonic())
-    wait_until(lambda: "what was not done by then is not done any more" in driver.view.said)
+    wait_until(lambda: "the rest was not sent" in driver.view.said)
     assert commits(board) == 0
 
 
