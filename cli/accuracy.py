@@ -1,6 +1,7 @@
 """The command `accuracy`."""
 
 import re
+from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any
 
@@ -31,9 +32,39 @@ FILE = re.compile(
 """A recording, by the suffix of its file, and its column, which may have colons."""
 
 
-@study("workers", "plot", *READING, kind=ReadingOptions)
+@dataclass(frozen=True, kw_only=True)
+class AccuracyOptions(ReadingOptions):
+    """The options of a recording, of a study, and of the bounds that set the gains."""
+
+    acceleration_max: Annotated[
+        float | None,
+        typer.Option(metavar="C", help="bound that sets the gains, 1e-9 to 1e6 m/s^2", show_default="the signal's own"),
+    ] = None
+    jerk_max: Annotated[
+        float | None,
+        typer.Option(metavar="J", help="bound that sets the gains, 1e-9 to 1e12 m/s^3", show_default="the swing's"),
+    ] = None
+
+    @property
+    def bounds(self) -> dict[str, float]:
+        """The bounds that are given, as for `measure`.
+
+        Raises:
+            BadInput: if one is out of range.
+        """
+        given = {}
+        if self.acceleration_max is not None:
+            within(self.acceleration_max, "--acceleration-max", *ACCELERATIONS_M_PER_S2, "m/s^2")
+            given["acceleration_max_m_per_s2"] = self.acceleration_max
+        if self.jerk_max is not None:
+            within(self.jerk_max, "--jerk-max", *JERKS_M_PER_S3, "m/s^3")
+            given["jerk_max_m_per_s3"] = self.jerk_max
+        return given
+
+
+@study("workers", "plot", "acceleration_max", "jerk_max", *READING, kind=AccuracyOptions)
 def command(
-    options: ReadingOptions,
+    options: AccuracyOptions,
     figure: Annotated[int | None, typer.Option(min=1, max=2, help="reproduce this figure of the paper")] = None,
     signal: Annotated[
         list[str] | None,
@@ -48,14 +79,6 @@ def command(
     encoder_phase_error: Annotated[
         float, typer.Option(metavar="COUNTS", help="phase error of channel B, -0.95 to 0.95 counts")
     ] = 0.0,
-    acceleration_max: Annotated[
-        float | None,
-        typer.Option(metavar="C", help="bound that sets the gains, 1e-9 to 1e6 m/s^2", show_default="the signal's own"),
-    ] = None,
-    jerk_max: Annotated[
-        float | None,
-        typer.Option(metavar="J", help="bound that sets the gains, 1e-9 to 1e12 m/s^3", show_default="the swing's"),
-    ] = None,
     assignments: EncoderSetOption = None,
 ) -> None:
     if figure and signal:
@@ -63,11 +86,13 @@ def command(
     curves = figures.curves(figure) if wanted is None and figure else curves_of(wanted)
     known, recorded = _signals(list(dict.fromkeys(signal or ["paper"])))
     encoder = _encoder(assignments, encoder_phase_error)
-    of_all = {"backend": backend, **_bounds(acceleration_max, jerk_max)}
-    if not known and (rates is not None or encoder or len(of_all) > 1):
+    of_all: dict[str, Any] = {"backend": backend}
+    if bounds := options.bounds:
+        of_all["bounds"] = bounds
+    if not known and (rates is not None or encoder or bounds):
         raise BadInput(
-            "--rates, --encoder-phase-error, --acceleration-max, --jerk-max and --set are for known motions: a recording "
-            "has its own"
+            "--rates, --encoder-phase-error, --acceleration-max, --jerk-max and --set are for known motions: a "
+            "recording has its own"
         )
     if options.given and not recorded:
         hint = ": the rates of known motions are --rates" if options.rate is not None else ""
@@ -92,18 +117,6 @@ def command(
     for each in readings:
         say(each)
     options.finish(result)
-
-
-def _bounds(acceleration_m_per_s2: float | None, jerk_m_per_s3: float | None) -> dict[str, float]:
-    """Return the bounds that are given, as for `measure`."""
-    given = {}
-    if acceleration_m_per_s2 is not None:
-        within(acceleration_m_per_s2, "--acceleration-max", *ACCELERATIONS_M_PER_S2, "m/s^2")
-        given["acceleration_max_m_per_s2"] = acceleration_m_per_s2
-    if jerk_m_per_s3 is not None:
-        within(jerk_m_per_s3, "--jerk-max", *JERKS_M_PER_S3, "m/s^3")
-        given["jerk_max_m_per_s3"] = jerk_m_per_s3
-    return given
 
 
 def _encoder(assignments: list[str] | None, phase_error_counts: float) -> dict[str, Any]:

@@ -13,8 +13,9 @@ from .fixed import shape
 class Powers(Block):
     """The terms c_n a^(n/g) 2^(k (g - n) / g) of a magnitude a.
 
-    Equation: with D = log2 of the leading bit, less k, and Q, R its quotient and rest by g, a term is an entry of a
-    table by R and the three bits below the leading one, shifted by n Q + k; see `hardwall.model.arithmetic.powers`.
+    Equation: D is log2 of the leading bit, less k; Q and R are its quotient and rest by g. A table has an entry for R
+    and the three bits below the leading one. A term is this entry, shifted by n Q + k. See
+    `hardwall.model.arithmetic.powers`.
 
     Latency: `latency` clocks from `start` to `done`: the shift that brings the leading one to the top takes two, the
     tables one, the shift of their entries one. A `start` may come at every clock.
@@ -37,7 +38,7 @@ class Powers(Block):
     term_0, term_1, ... : Out
         The terms in the order of the design's, unsigned.
     done : Out(1)
-        High for the clock in which the terms are those of a start.
+        High in the clock in which the terms of a start are ready.
 
     Source: the model's module names it.
     """

@@ -16,8 +16,8 @@ from .levant import arrive
 class Estimator(EstimatorBlock):
     """A differentiator of one of the four designs, one sample at a time.
 
-    Equation, per sample, in counts and sample periods, with r = |e|^(1 / (N + 1)); without filtering e = z0 - count,
-    with it e = w, and the lines are those of `hardwall.model.estimators.levant_higher_design`:
+    Equation, per sample, in counts and sample periods, with r = |e|^(1 / (N + 1)). The error e is z0 - count; with
+    filtering it is w. `hardwall.model.estimators.levant_higher_design` has the lines without filtering, too:
 
         w  <- w + (z0 - count)      - c_N     r^N     sign(e)
         z0 <- z0 + z1 + z2 / 2      - c_(N-1) r^(N-1) sign(e)
@@ -28,9 +28,9 @@ class Estimator(EstimatorBlock):
     Start: at the first sample, and with `restart`, z0 = count and all else is 0.
 
     Latency: `latency` clocks from `strobe` to `valid`: one for the distance from the count, one for the magnitude of
-    e, those of the powers, one for the sums; the next `strobe` may come with `valid`.
+    e, the powers' own, one for the sums. The next `strobe` may come with `valid`.
 
-    Rounding and overflow: the powers are rough, as derived; Taylor's terms round half up; what saturates is flagged.
+    Rounding and overflow: the powers are rough, as derived; Taylor's terms round half up; saturations are flagged.
     The count may wrap.
 
     Parameters

@@ -1,7 +1,7 @@
-"""The kernels of Levant's differentiators of order 2 and 3, in fixed point and in float64; their equations, formats and
-sources are in `levant_higher_design`, which also has the four designs.
+"""The kernels of Levant's differentiators of order 2 and 3, in fixed point and in float64, and their four designs.
 
-At the first sample everything is 0, so that there is no correction either: the state after it is that of rest.
+Equations, formats and sources are in `levant_higher_design`. At the first sample every state is 0, and so is every
+correction: the next state is the state of rest.
 """
 
 from ..arithmetic import powers

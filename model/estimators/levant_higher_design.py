@@ -10,44 +10,48 @@ the acceleration and z3 the jerk; N is the order, one more with filtering, and r
     z2 <- z2 + z3           - c_(N-2) r^(N-2) sign(e)
     z3 <- z3                - ...                               sign(0) = 0
 
-All gains follow from one number, L, the bound on the derivative after the last that is tracked: the jerk for order 2,
+All gains follow from one number, L. It bounds the derivative after the last one that is tracked: the jerk for order 2,
 the snap (the derivative of the jerk) for order 3. c_n = LAMBDA[N][n] L^((N + 1 - n) / (N + 1)), in counts and samples.
-The steps have the terms of Taylor's series, so that the scheme is homogeneous, but for z3 / 6 in z0: it moves the
-position by T^-3 / 6 counts a sample, with T from below, and changes the errors by less than a hundredth at 1 kHz.
+The steps have the terms of Taylor's series, so the scheme is homogeneous. z3 / 6 in z0 is left out. It moves the
+position by T^-3 / 6 counts a sample (T: see below). This changes the errors by less than a hundredth at 1 kHz.
 
 Sources: Levant, International Journal of Control 76 (2003), 924, the differentiator of any order; Livne and Levant,
 Automatica 50 (2014), 2089, the homogeneous discretisation; Levant and Livne, European Journal of Control 55 (2020), 33,
 filtering and the table of LAMBDA.
 
-Scales. T = L^(-1 / (order + 1)) samples is the differentiator's own time: in T, L moves one count. With an error of a
-count, the n-th derivative is corrected by some T^-(n + 1) a sample, and w, some T counts times samples, by one.
+Scales. T = L^(-1 / (order + 1)) samples is the differentiator's own time: in T, L moves one count. An error of a count
+corrects the n-th derivative by some T^-(n + 1) a sample, and w by one. w is some T counts times samples.
 
 Powers. The terms c_n r^n come from the leading bits of |e| (`hardwall.model.arithmetic.powers`), wrong by 3 % at most
 in r: a homogeneous differentiator converges with any gains near its own. A negative e enters as its complement.
 
 Formats, derived.
 
-- Fractions: an LSB of z_n is at most 2**-RESOLUTION_BITS of what a count's error corrects in it, with the designed L.
-- `gap` (z0 - f), `w` and the z_n hold what reversals between the largest speeds make, at any times: a velocity that
-  switches by V has the peaks of `PEAKS`, times V tau^(1 - n), tau = (V / L)^(1 / order); with the least L for gap and
-  w, and with the largest for the others. NOISE times the scale of a count's error is added. What is beyond saturates,
-  with a flag: gap and w (`error_saturated`), z1 (`velocity_saturated`), z2 and z3 (`state_saturated`). At the end of
-  z1, z2 and z3 begin again from 0: they would go on pushing.
-- `velocity`: z1 rounded half up to an LSB of sqrt(C') 2**-OUTPUT_BITS, C' being C in counts a sample^2. The state z1
-  has half of that LSB added, so that the output is its floor.
+- Fractions: a count's error corrects z_n by at least 2**RESOLUTION_BITS of its LSB, with the designed L.
+- Integers: `gap` (z0 - f), `w` and the z_n hold reversals between the largest speeds, at any times. A velocity that
+  switches by V has the peaks of `PEAKS`, times V tau^(1 - n), with tau = (V / L)^(1 / order). The least L counts for
+  gap and w, the largest for the others. NOISE times the scale of a count's error is added.
+- Saturation, with a flag: gap and w (`error_saturated`), z1 (`velocity_saturated`), z2 and z3 (`state_saturated`). At
+  the end of z1, z2 and z3 begin again from 0: they would go on pushing.
+- `velocity`: z1 rounded half up to an LSB of sqrt(C') 2**-OUTPUT_BITS, with C' the bound C in counts a sample^2. Half
+  of this LSB is added to the state z1, so the output is its floor.
 
-Range of the gains. The word is the number of octaves by which L is raised, so every word that is accepted has the
-gains of one L. L is at most LARGEST_L counts a sample^(order + 1): in T >= 2 samples the steps are still small. The
-default is the axis's bound J on the jerk for order 2; for order 3 it is SNAP_SHARE J (J / q)^(1/3), from the time in
-which J moves a count, as the axis's own J follows from C unless it is given. At low rates it is LARGEST_L if that is
-less.
+Range of the gains. The word is the number of octaves by which L is raised. So every accepted word has the gains of one
+L. L is at most LARGEST_L counts a sample^(order + 1): T is at least 2 samples then, and the steps are still small. The
+default for order 2 is the axis's bound J on the jerk. For order 3 it is SNAP_SHARE J (J / q)^(1/3): J changes in the
+time in which it moves a count. At low rates it is LARGEST_L if that is less.
 
-Limits. The count may wrap. The first sample, and a sample with `restart`, begin with z0 = f and all else 0: a start
-from rest has no transient; a start in motion at V has the transient of a step by V. It overshoots by 38 to 57 % and is
-within 0.5 % after 2.8 to 3.6 tau. Longer without a bound that holds: while the derivative that L bounds is larger than
-L, as in an impact, the estimate lags. At standstill the states chatter by some c_n. Where counts come in a short
-pattern, as at half a count a sample, z1 locks to the pattern, and its mean is off by up to MEAN_ERROR counts in T: as
-far as its own error. The published algorithm has the same mean in float64. z0 alone never drifts from the count.
+Limits.
+
+- The count may wrap.
+- The first sample, and a sample with `restart`, begin with z0 = f and all else 0. A start from rest has no transient. A
+  start in motion at V has the transient of a step by V. It overshoots by 38 to 57 % and is within 0.5 % after 2.8 to
+  3.6 tau.
+- The estimate lags while the derivative that L bounds is larger than L, as in an impact.
+- At standstill the states chatter by some c_n.
+- Where counts come in a short pattern, such as half a count a sample, z1 locks to the pattern. Its mean is off by up to
+  MEAN_ERROR counts in T, as far as its own error. The published algorithm has the same mean in float64. z0 alone never
+  drifts from the count.
 """
 
 import math
@@ -63,15 +67,15 @@ from ..words import Word
 from .estimate import EstimatorDesign, EstimatorGains, fraction_bits
 
 LAMBDA = {2: (1.1, 2.12, 2.0), 3: (1.1, 3.06, 4.16, 3.0), 4: (1.1, 4.57, 9.30, 10.03, 5.0)}
-"""The coefficients by N, that of the sign first."""
+"""The coefficients by N, from the power 0 up."""
 PEAKS = {
     (2, 0): (0.0, 0.33, 0.95, 1.14),
     (2, 1): (0.082, 0.50, 1.08, 1.19),
     (3, 0): (0.0, 0.29, 1.31, 1.97, 1.37),
     (3, 1): (0.033, 0.345, 1.35, 2.01, 1.32),
 }
-"""The peaks of |w|, |z0 - f|, |z1| and so on by order and filtering, with L = 1, for a velocity that switches between
-1/2 and -1/2 as often as it may, at the worst times."""
+"""The peaks of |w|, |z0 - f|, |z1| and so on by order and filtering, with L = 1. The velocity switches between 1/2 and
+-1/2, any number of times, at the worst times."""
 NOISE = 4.0
 """What an error of a count makes beside a motion, at most, in its scale: counts for z0, T**-n for z_n, T for w."""
 MEAN_ERROR = {(2, 0): 0.5, (3, 0): 1.1, (2, 1): 0.55, (3, 1): 2.1}
@@ -128,7 +132,7 @@ class Params(NamedTuple):
     octaves: int
     relay: int
     fractions: tuple[int, ...]
-    """Those of w, z0, z1, z2, z3."""
+    """Of w, z0, z1, z2, z3."""
     limits: tuple[int, ...]
     """The largest words of w, z0 - f, z1, z2, z3; the least is one less than the negative."""
     half: int

@@ -32,6 +32,8 @@ RATES_HZ = (1_000, 10_000_000)
 CLOCK_HZ = 50_000_000
 CLOCKS = 50
 DELAY_MAX_S = 0.1
+BOUNDS = "acceleration_max_m_per_s2", "jerk_max_m_per_s3"
+"""The bounds of a motion from which default gains follow."""
 SCENE = "mhz"
 """The scene with the measured device; its encoder is given errors."""
 FASTEST = {"controller.speed_max_m_per_s": 0.4}
@@ -129,8 +131,8 @@ def spec_of(job: dict) -> AxisSpec:
         ValueError: if there is no such axis; the message names the field.
     """
     known = signals.load(job["signal"])
-    bound = job.get("acceleration_max_m_per_s2") or known.acceleration_max_m_per_s2
-    jerk = job.get("jerk_max_m_per_s3") or known.jerk_max_m_per_s3
+    given = job.get("bounds") or {}
+    bound, jerk = (given.get(name, getattr(known, name)) for name in BOUNDS)
     name, rate = job["estimator"], job["sample_hz"]
     encoder = job.get("encoder") or {}
     if LEARNED in encoder:
@@ -162,8 +164,7 @@ def measure(
     sample_hz: int,
     backend: str = "float",
     encoder: dict[str, Any] | None = None,
-    acceleration_max_m_per_s2: float | None = None,
-    jerk_max_m_per_s3: float | None = None,
+    bounds: dict[str, float] | None = None,
     gains: dict[str, float] | None = None,
     bits_dropped: int = 0,
 ) -> dict:
@@ -175,8 +176,7 @@ def measure(
         sample_hz: sample rate of the estimator.
         backend: `float`, `fixed` or `rtl`.
         encoder: errors of the encoder, as for `errors_of`, and `LEARNED` for a map of its scale; None for none.
-        acceleration_max_m_per_s2: C for the default gains; None for the signal's own.
-        jerk_max_m_per_s3: jerk for the default gains; None for the swing's.
+        bounds: bounds for the default gains, some of `BOUNDS`; the signal's own where they are not given.
         gains: gains to use instead, by the names of the estimator's `Gains`.
         bits_dropped: number of fraction bits taken from the estimator's words.
 
@@ -186,8 +186,7 @@ def measure(
     """
     known = signals.load(signal)
     job = {"estimator": estimator, "signal": signal, "sample_hz": sample_hz, "backend": backend, "encoder": encoder}
-    job |= {"acceleration_max_m_per_s2": acceleration_max_m_per_s2, "jerk_max_m_per_s3": jerk_max_m_per_s3}
-    job |= {"gains": gains, "bits_dropped": bits_dropped}
+    job |= {"bounds": bounds, "gains": gains, "bits_dropped": bits_dropped}
     spec = spec_of(job)
     begin = math.ceil(known.judged_from_s * sample_hz)
     judge, raised = judged(known, spec, output, backend, encoder)

@@ -77,7 +77,7 @@ class Choice:
 def jobs(pairs: list[tuple[str, str]], sample_hz: int, backend: str, situations: Situations = SITUATIONS) -> list[dict]:
     """Return the arguments of `accuracy.measure` for every situation of every (estimator, output) pair."""
     bound = signals.load("hit").acceleration_max_m_per_s2
-    common = {"sample_hz": sample_hz, "backend": backend, "acceleration_max_m_per_s2": bound}
+    common = {"sample_hz": sample_hz, "backend": backend, "bounds": {"acceleration_max_m_per_s2": bound}}
     return [
         {"estimator": estimator, "output": output, **common, **situation}
         for estimator, output in pairs

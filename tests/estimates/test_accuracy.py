@@ -89,12 +89,14 @@ def test_a_difference_is_half_a_sample_late():
 
 
 def test_gains_follow_the_bound():
-    own, given = (measure("levant", "u", "steady:10", 10_000, acceleration_max_m_per_s2=c) for c in (None, 3.0))
+    own, given = (
+        measure("levant", "u", "steady:10", 10_000, bounds=b) for b in (None, {"acceleration_max_m_per_s2": 3.0})
+    )
     assert own["gains"]["alpha_m_per_s2"] == pytest.approx(1.1 * signals.DEVICE_ACCELERATION)
     assert given["gains"] == pytest.approx({"alpha_m_per_s2": 3.3, "lambda_sqrt_m_per_s": math.sqrt(3)})
     other = measure("levant", "u", "steady:10", 10_000, gains={"alpha_m_per_s2": 1.0, "lambda_sqrt_m_per_s": 2.0})
     assert other["gains"]["alpha_m_per_s2"] == 1.0
-    own, given = (measure("levant-2", "z1", "steady:10", 10_000, jerk_max_m_per_s3=j) for j in (None, 3e3))
+    own, given = (measure("levant-2", "z1", "steady:10", 10_000, bounds=b) for b in (None, {"jerk_max_m_per_s3": 3e3}))
     assert own["gains"]["jerk_m_per_s3"] == pytest.approx(signals.load("steady:10").jerk_max_m_per_s3)
     assert own["jerk_max_mm_s3"] == pytest.approx(own["gains"]["jerk_m_per_s3"] * 1e3)
     assert given["gains"] == {"jerk_m_per_s3": 3e3}
@@ -107,7 +109,7 @@ def test_the_clock_leaves_every_estimator_its_time():
 
 def test_an_axis_that_cannot_be_says_which():
     with pytest.raises(ValueError, match=r"^levant at 1000 Hz with C 1e\+12 m/s\^2: lambda_sqrt_m_per_s must be"):
-        measure("levant", "u", "paper", 1000, acceleration_max_m_per_s2=1e12)
+        measure("levant", "u", "paper", 1000, bounds={"acceleration_max_m_per_s2": 1e12})
 
 
 def test_outputs_of_names():

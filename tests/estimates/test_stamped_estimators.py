@@ -186,7 +186,7 @@ def test_one_set_of_gains_bears_edges_of_their_own_and_an_impact(error):
     """The gains are those for the impact's acceleration and the swing's jerk, in both."""
     bound = signals.load("hit").acceleration_max_m_per_s2
     encoder = {"encoder.edge_error_counts": error, "encoder.seed": 2}
-    of_one = {"backend": "fixed", "encoder": encoder, "acceleration_max_m_per_s2": bound}
+    of_one = {"backend": "fixed", "encoder": encoder, "bounds": {"acceleration_max_m_per_s2": bound}}
     swing, impact = (accuracy.measure("edge-kalman", "u", name, 1_000_000, **of_one) for name in ("paper", "hit"))
     assert swing["rms_mm_s"] < WANTED[error]
     assert impact["rms_mm_s"] < 0.3

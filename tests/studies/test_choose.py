@@ -10,7 +10,7 @@ def test_every_error_is_in_its_own_place():
     pairs = [("fdm", "u"), ("levant", "u"), ("levant", "u1")]
     jobs = choose.jobs(pairs, 1000, "fixed")
     assert len(jobs) == len(pairs) * len(choose.SITUATIONS)
-    assert len({job["acceleration_max_m_per_s2"] for job in jobs}) == 1
+    assert len({job["bounds"]["acceleration_max_m_per_s2"] for job in jobs}) == 1
     measured = [{"rms_mm_s": number, "delay_s": -number} for number, _ in enumerate(jobs)]
     rows = choose.table(pairs, measured, [COST | {"estimator": name} for name in ("fdm", "levant")])
     check("choose", choose.Choice(rows).report())
