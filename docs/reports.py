@@ -5,7 +5,7 @@
 its command, the version, the date and the machine. Its origin is a digest of the code of every module that the command
 imports, but for those that only show or keep what was computed; comments and docstrings are no part of it. Where the
 command names its estimators, the others are no part of it either, so that a new estimator leaves most reports as they
-are.
+are. What reads recordings is a part only where the command names one.
 """
 
 import argparse
@@ -40,6 +40,8 @@ HARDWARE = "hdl", "sim/boards", "sim/rtl"
 """Rooms that matter to what runs the RTL, or counts its cells."""
 OF_HARDWARE = "bench", "board", "choose", "costs", "synth"
 """Commands that do."""
+READING = "sim/recordings"
+"""The room that matters to a command that reads a recording."""
 REGISTRIES = "model/estimators/registry.py", "hdl/estimators/registry.py"
 """What imports every estimator."""
 DEFAULT = "levant"
@@ -126,6 +128,12 @@ def _chosen(words: list[str]) -> set[str]:
     return {of for name in (*names, DEFAULT) for of in (ESTIMATORS[name], blocks.ESTIMATORS[name].__module__)}
 
 
+def _reads(words: list[str]) -> bool:
+    """Return whether a command reads a recording: a file of the project that is no scene."""
+    names = (word.partition(":")[0] for word in words if not word.endswith(".toml"))
+    return any((TREE / name).is_file() for name in names)
+
+
 def sources_of(command: str) -> list[Path]:
     """Return the sources that the numbers of a command come from: what it imports, directly or not.
 
@@ -134,7 +142,7 @@ def sources_of(command: str) -> list[Path]:
     words = shlex.split(command)
     chosen = _chosen(words)
     hardware = words[0] in OF_HARDWARE or "rtl" in words
-    others = (*SHOWING, *(() if hardware else HARDWARE))
+    others = (*SHOWING, *(() if hardware else HARDWARE), *(() if _reads(words) else (READING,)))
     own = TREE / "cli" / f"{words[0]}.py"
     registries = {TREE / name for name in REGISTRIES}
     waiting, seen = [own], set[Path]()
