@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import checks
-from .counter import check_bits, cure, unwrapped
+from .counter import check_span, cure, modulus_of, unwrapped
 from .edge_times import check_edges, samples_of, since, times_of
 from .edge_velocity_estimator import EdgeVelocityEstimator, default_clock_hz
 from .motion import Motion
@@ -51,8 +51,9 @@ def velocity(
         backend: `fixed` for the hardware's words, `float` for the same algorithm in float64 with unrounded gains.
         axis: the axis of time.
         settings: further bounds (`speed_max`, unit/s; `travel`, unit; see `motion.Motion`); `count_bits`, the width of
-            a counter that wraps; the estimator's `gains`; and run-time words by name, in seconds and the unit of
-            `count`. A word may be an array: it is broadcast against the other axes, a value a lane.
+            a counter that wraps, or `count_modulus`, its number of counts; the estimator's `gains`; and run-time words
+            by name, in seconds and the unit of `count`. A word may be an array: it is broadcast against the other axes,
+            a value a lane.
 
     Returns:
         float64, the shape of the counts; where words are arrays, the shape to which both broadcast.
@@ -73,9 +74,9 @@ def velocity(
     is_floating(backend)
     check_of_counts(estimator)
     output_of(estimator, output)
-    bits = settings.pop("count_bits", None)
-    check_bits(bits)
-    whole = unwrapped(array, bits)
+    modulus = modulus_of(settings.pop("count_bits", None), settings.pop("count_modulus", None))
+    check_span(array, modulus)
+    whole = unwrapped(array, modulus)
     motion, found = _motion(whole, sample_hz, count, acceleration_max, settings)
     taken = VelocityEstimator(sample_hz, estimator, motion, output, backend, **settings)
     made = taken(np.moveaxis(whole, -1, axis), axis)

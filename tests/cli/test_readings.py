@@ -83,6 +83,14 @@ def test_accuracy_takes_a_column_in_other_units(monkeypatch, capsys, folder, fre
         (["--column", "angle", "--unit", "feet"], "--unit must be "),
         (["--column", "angle", "--gaps", "fill"], "--gaps must be "),
         (["--column", "angle", "--counter-bits", "7"], "--counter-bits must be "),
+        (
+            ["--column", "angle", "--counter-modulus", "3"],
+            "--counter-modulus must be a whole number of 4 to 4611686018427387904, not '3'",
+        ),
+        (
+            ["--column", "angle", "--counter-modulus", "9", "--counter-bits", "8"],
+            "both the range of the counter: give one",
+        ),
         (["--channels", "A"], "--channels must be two or three names or numbers, A,B or A,B,Z, not 'A'"),
         (
             ["--channels", "A,B", "--rate", "1", "--time", "Zeit"],

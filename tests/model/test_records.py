@@ -85,6 +85,13 @@ def test_a_counter_that_wraps_is_named_and_unwrapped():
         velocity(wrapped, 1e3, "fdm")
 
 
+def test_a_counter_of_a_turn_is_unwrapped():
+    counts = np.cumsum(rng().integers(-900, 1000, 5000))
+    bounds = {"acceleration_max": 1e6, "speed_max": 2e6, "travel": 1e6}
+    made = velocity(counts, 1e3, "kalman", **bounds)
+    assert velocity(counts % 4000, 1e3, "kalman", count_modulus=4000, **bounds).tolist() == made.tolist()
+
+
 def test_no_lanes_are_no_velocities():
     assert velocity(np.zeros((0, 5), np.int64), 1e3).shape == (0, 5)
 
