@@ -10,10 +10,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .checks import integers, shown
+from .checks import integers
 
 SAMPLES_MAX = 10**8
 """The most samples of a record of edges, or of a piece of it."""
+UNIT = "are they in seconds? Times in ms, us or ns may be datetime64 of that unit"
+"""What to ask where times last too long, or not long enough."""
 CLOCKS_MAX = 2.0**62
 """The most clocks of a record of edges."""
 
@@ -46,7 +48,10 @@ def times_of(times_s: ArrayLike, like: np.ndarray | None = None, name: str = "ti
     if not times.size:
         return np.zeros(times.shape, np.float64 if like is None else like.dtype)
     if times.dtype.kind not in "fiuM":
-        raise TypeError(f"{name} must be numbers, not {times.dtype}")
+        cure = ": divide them by np.timedelta64(1, 's')" if times.dtype.kind == "m" else ""
+        raise TypeError(f"{name} must be numbers or datetime64, not {times.dtype}{cure}")
+    if times.dtype.kind == "M" and np.datetime_data(times.dtype)[0] in "YM":
+        raise TypeError(f"{name} must be datetime64 in days or a finer unit, not {times.dtype}")
     if not (finite := np.isfinite(times)).all():
         place = tuple(int(index) for index in np.unravel_index(np.argmin(finite), times.shape))
         where = f" at element {', '.join(map(str, place))}" if place else ""
@@ -71,9 +76,12 @@ def check_edges(times: np.ndarray, counts: np.ndarray, before: int = 0) -> None:
         before: how many of the first elements are of an earlier piece.
     """
     if (wrong := np.flatnonzero(times[1:] <= times[:-1])).size:
-        earlier, later = (times[wrong[0] + n].item() for n in (0, 1))
+        earlier, later = (times[wrong[0] + n] for n in (0, 1))
+        same, cure = np.count_nonzero(times[1:] == times[:-1]), ""
+        if earlier == later:
+            cure = f"; {same} of {len(times) - 1} are as the one before: give times fine enough to tell edges apart"
         place = wrong[0] + 1 - before
-        raise ValueError(f"times_s must increase, not from {shown(earlier)} to {shown(later)} at element {place}")
+        raise ValueError(f"times_s must increase, not from {earlier} to {later} at element {place}{cure}")
     steps = np.diff(counts)
     if (wrong := np.flatnonzero(np.abs(steps) != 1)).size:
         place = wrong[0] + 1 - before
@@ -85,10 +93,18 @@ def since(start: np.ndarray, times: np.ndarray) -> Times:
 
     Args:
         start: the time of the start, what `times_of` returns, shape ().
-        times: the times, what `times_of` returns.
+        times: the times, what `times_of` returns; they increase.
+
+    Raises:
+        ValueError: if a difference of datetime64 exceeds int64.
     """
     if times.dtype.kind == "M":
-        since_s = (times - start) / np.timedelta64(1, "s")
+        passed = times - start
+        # A difference beyond int64 is negative, or no time.
+        if passed.size and not passed[-1] >= np.timedelta64(0):
+            unit = np.datetime_data(times.dtype)[0]
+            raise ValueError(f"times_s must last less than 2**63 {unit}: give {times.dtype} in a coarser unit")
+        since_s = passed / np.timedelta64(1, "s")
     else:
         since_s = (times - start).astype(np.float64)
     exact = "f" not in (times.dtype.kind, start.dtype.kind)
@@ -110,7 +126,7 @@ def samples_of(times: Times, counts: np.ndarray, sample_hz: float) -> np.ndarray
     lasts = times.since_s[-1]
     samples = float(sample_of(times, sample_hz)[-1])
     if samples < 1:
-        raise ValueError(f"times_s must last a sample of {1 / sample_hz:g} s or more, not {lasts:g} s")
+        raise ValueError(f"times_s must last a sample of {1 / sample_hz:g} s or more, not {lasts:g} s: {UNIT}")
     check_length(samples, sample_hz)
     firsts = np.ceil((times.since_s - times.unsure_s) * sample_hz).astype(np.int64)
     firsts[0] = 0
@@ -122,7 +138,7 @@ def check_length(samples: float, sample_hz: float) -> None:
     if samples > SAMPLES_MAX:
         raise ValueError(
             f"times_s must last at most {SAMPLES_MAX:g} samples at {sample_hz:g} Hz, not {samples:g} in "
-            f"{samples / sample_hz:g} s: are they in seconds?"
+            f"{samples / sample_hz:g} s: {UNIT}"
         )
 
 

@@ -187,8 +187,7 @@ class EdgeVelocityEstimator:
         if end.shape:
             raise ValueError(f"until_s must be one time, not an array of shape {end.shape}")
         if end < times[-1]:
-            last, given = checks.shown(times[-1].item()), checks.shown(end.item())
-            raise ValueError(f"until_s must be {last} or later, the last time that was given, not {given}")
+            raise ValueError(f"until_s must be {times[-1]} or later, the last time that was given, not {end}")
         return end[None]
 
     def _advance(self, times: np.ndarray, counts: np.ndarray, end: np.ndarray, known: int) -> np.ndarray:

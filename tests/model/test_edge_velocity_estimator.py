@@ -213,8 +213,9 @@ def test_what_is_refused_leaves_no_trace():
     end, count = times[99], counts[99]
     dates = np.array(["2026-11-28T21:00:00"], "M8[ns]")
     for error, said, *arguments in (
-        (ValueError, r"times_s must increase, not from .* to .* at element 0$", [end], [count + 1]),
-        (ValueError, r"times_s must increase, not from .* to .* at element 1$", [end + 1, end + 1], [count + 1, count]),
+        (ValueError, r"times_s must increase, not from .* to .* at element 0; 1 of 1 are", [end], [count + 1]),
+        (ValueError, r"times_s must increase, not from .* to .* at element 1; 1 of 2 are",
+         [end + 1, end + 1], [count + 1, count]),
         (ValueError, r"counts must change by 1 at an edge, not by 2 at element 0$", [end + 1], [count + 2]),
         (ValueError, r"counts must change by 1 at an edge, not by 0 at element 0$", [end + 1], [count]),
         (ValueError, r"not by -3 at element 1$", [end + 1, end + 2], [count + 1, count - 2]),
@@ -229,7 +230,7 @@ def test_what_is_refused_leaves_no_trace():
         (ValueError, r"until_s must be 0\.\d+ or later, the last time that was given, not 0\.\d+", [], [], end - 1e-3),
         (ValueError, r"until_s must be one time, not an array of shape \(1,\)", [], [], [end]),
         (ValueError, "until_s must be finite, not inf", [], [], np.inf),
-        (TypeError, "until_s must be numbers, not <U1", [], [], "x"),
+        (TypeError, "until_s must be numbers or datetime64, not <U1", [], [], "x"),
     ):  # fmt: skip
         with pytest.raises(error, match=said):
             made(*arguments)
