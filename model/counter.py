@@ -1,5 +1,7 @@
 """Counters that wrap in records: a count that wrapped is unwrapped."""
 
+from typing import Any
+
 import numpy as np
 
 from .checks import FieldError, check_int
@@ -8,7 +10,7 @@ WIDTHS = 8, 16, 32
 """The usual widths of counters, bits."""
 
 
-def modulus_of(bits: int | None, modulus: int | None) -> int | None:
+def modulus_of(bits: Any, modulus: Any) -> int | None:
     """Return at how many counts a counter wraps, from `count_bits` or `count_modulus`; None if it does not.
 
     Raises:
