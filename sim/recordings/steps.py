@@ -15,7 +15,8 @@ all others, the range may be smaller. It is then one turn, where the values are 
 least power of two that holds all counts, of 8 to 31 bits, provided that
 
 - every step across the end of the range, once unwrapped, differs from the median of the steps beside it by no more than
-  their spread, or `CLOSE` of the smallest steps; over missing samples, it is no faster than the other steps; and
+  their spread, or `CLOSE` times the number that divides all steps; over missing samples, it is no faster than the
+  other steps; and
 - no step is longer than a quarter of the range, so that its direction is beyond doubt.
 
 A file that does not meet both has another fault than a counter that wrapped, and is refused. Of a range that is given,
@@ -38,7 +39,7 @@ BESIDE = 3
 JUMP, FLOOR = 4, 8
 """How often the spread a step may be off, and the least spread in smallest steps: single counts are no jump."""
 CLOSE = 2
-"""How many smallest steps a step across the end of a range may be off."""
+"""How often the number that divides all steps a step across the end of a range may be off."""
 WRAP_BITS = range(8, SPAN_BITS)
 """The widths of counters that are found, and that a message knows."""
 LARGEST = 1 << 61
@@ -155,12 +156,12 @@ class Steps:
 
     def _misfits(self, within: np.ndarray, wraps: np.ndarray, spreads: int) -> np.ndarray:
         """Return the steps across the end of a range which differ from those beside them by more than so many spreads,
-        and `CLOSE` of the smallest steps."""
+        and `CLOSE` times what divides all steps."""
         places = np.flatnonzero(wraps & ~self._gaps)
         if len(within) <= 2 * BESIDE or not len(places):
             return places[:0]
         usual, spread = _around(within, places)
-        near = np.maximum(spreads * spread, CLOSE * _smallest(within))
+        near = np.maximum(spreads * spread, CLOSE * float(np.gcd.reduce(within)))
         return places[np.abs(within[places] - usual) > near]
 
     def _check_range(self, counter: Counter, steps: np.ndarray, wraps: np.ndarray) -> None:
@@ -201,7 +202,7 @@ class Steps:
     def _cure(self, steps: np.ndarray, place: int, off: float, spread: float, held: int) -> str:
         """Return what has probably happened at a step that is `off` by so much, and what helps."""
         count, cut, least = int(self._counts[place + 1]), "cut the recording at this line", _smallest(steps)
-        close = max(spread, CLOSE * least)
+        close = max(spread, CLOSE * float(np.gcd.reduce(steps)))
         if self._turn is not None and abs(abs(off) - self._turn) <= close:
             return "if the angle wrapped at a turn, unwrap it before: it is too fast here to tell its direction"
         bits = next((bits for bits in WRAP_BITS if abs(abs(off) - 2.0**bits) <= close), None)
@@ -224,7 +225,7 @@ class Steps:
         for another step."""
         least, reach = int(self._spread[-1]) + 1, close + float(np.median(np.abs(steps)))
         jumps = [abs(steps[place] - usual) for place, usual, _ in _jumps(steps, self._gaps)]
-        likely = max(float(np.median([each for each in jumps if abs(each - off) <= reach])), least)
+        likely = max(float(np.mean([each for each in jumps if abs(each - off) <= reach])), least)
         if abs(off - least) > reach or not MODULI[0] <= likely <= MODULI[1]:
             return ""
         near = round(likely / ROUND) * ROUND

@@ -218,6 +218,14 @@ def test_a_modulus_that_is_no_power_of_two_is_advised(read, refused, modulus, sp
     assert (np.diff(found.counts) == np.diff(exact)).all()
 
 
+@pytest.mark.parametrize(("modulus", "speed"), [(4000, 75.4), (12_345, 151.7)])
+def test_a_modulus_is_advised_where_the_counter_passes_its_end_fast(refused, modulus, speed):
+    """It was taken for the next power of two where all steps are large."""
+    exact = np.floor(speed * np.arange(3000)).astype(int)
+    said = refused(column(exact % modulus), rate_hz=1000)
+    assert said.partition(": if ")[2].startswith(f"a counter of about {modulus} counts wrapped")
+
+
 @pytest.mark.parametrize("counts", [zeroed(), held(), one_wrong()], ids=["set to 0", "held", "one wrong"])
 def test_a_modulus_is_not_advised_for_another_fault(refused, counts):
     assert "--counter-modulus" not in refused(column(counts), rate_hz=1000)
