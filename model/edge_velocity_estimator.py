@@ -23,7 +23,7 @@ from .stamped import Controller, Edges, State, controller, decode, sample
 from .velocity_estimator import is_floating, output_of
 
 CLOCK_HZ, CLOCKS = 100e6, 1 << 16
-"""The clock that stamps edges is at least so fast, but for what it has in a sample beyond so many clocks."""
+"""The lowest rate of the stamping clock, Hz, unless a sample would then have more clocks than this number."""
 CLOCK_RANGE = 1e-6, 2.0**48
 
 
@@ -62,8 +62,8 @@ class EdgeVelocityEstimator:
         first = estimator(times_s[:500], counts[:500])
         second = estimator(times_s[500:], counts[500:])
 
-    The velocities of all pieces together are those of `velocity_of_edges`, which is made of it. `copy.deepcopy` and
-    `pickle` keep the state, to go on from it twice, or elsewhere.
+    All pieces together have the velocities of `velocity_of_edges`. `copy.deepcopy` and `pickle` keep the state, to go on
+    from it twice, or elsewhere.
 
     Args:
         sample_hz: rate of the velocities, Hz; it need not be whole.
@@ -77,7 +77,7 @@ class EdgeVelocityEstimator:
         settings: run-time words by name, as of `set`.
 
     Attributes:
-        spec: the axis that the estimator is of; its second is that of `record_time`.
+        spec: the axis that the estimator is of; its second is the second of `record_time`.
         words: the run-time words that may be set, by name, with their ranges in true seconds.
 
     Raises:
@@ -116,7 +116,7 @@ class EdgeVelocityEstimator:
         return f"EdgeVelocityEstimator({self._time.sample_hz!r}, {self.spec.estimator!r}, ...)"
 
     def reset(self) -> None:
-        """Forget every edge: the next time and count are those of a start."""
+        """Forget every edge: the next time and count begin a record."""
         self._state = controller(self._axis, int(level(0)))[1]
         self._samples, self._clock = 0, 0
         self._waiting: list[Edges] = []
@@ -149,7 +149,7 @@ class EdgeVelocityEstimator:
             times_s: s, shape (edges,), increasing, and later than all times before: the time of every edge. The very
                 first is no edge, but the start. Integers and `datetime64` keep the resolution that float64 does not
                 have far from 0; integers are seconds, too.
-            counts: integers of the same shape: the count after every edge; the first is that of the start. An edge
+            counts: integers of the same shape: the count after every edge; the first belongs to the start. An edge
                 changes it by 1, also from one piece to the next.
             until_s: all edges up to this time, and at it, are now given, so that samples up to it are complete. None:
                 the last of the times. It brings the velocities of a standstill, at which no edge comes.
@@ -205,7 +205,7 @@ class EdgeVelocityEstimator:
         return self._velocities(samples)
 
     def _velocities(self, samples: int) -> np.ndarray:
-        """Take so many samples in all; return their velocities but that of sample 0."""
+        """Take so many samples in all; return their velocities, without sample 0."""
         first, self._samples = self._samples, samples
         if samples == first:
             return np.zeros(0)

@@ -52,8 +52,8 @@ def velocity(
         output: the estimator's output; None for its first.
         backend: `fixed` for the hardware's words, `float` for the same algorithm in float64 with unrounded gains.
         axis: the axis of time.
-        settings: bounds (`speed_max`, unit/s; `travel`, unit; see `motion.Motion`). `count_bits` or `count_modulus`: the
-            range of a counter that wraps. `gains`: the estimator's gains. Others are run-time words, in seconds and the
+        settings: bounds (`speed_max`, unit/s; `travel`, unit; see `motion.Motion`). `count_bits` or `count_modulus`:
+            the range of a counter that wraps. `gains`: the estimator's gains. Others are run-time words, in seconds and the
             unit of `count`, or arrays of them with a value a lane, broadcast against the other axes.
 
     Returns:
