@@ -7,13 +7,13 @@ from typing import Annotated, Literal
 import typer
 
 from ..model.checks import shown
+from ..sim.recordings.counter import BITS, MODULI
 from ..sim.recordings.counts import UNITS, size_of
 from ..sim.recordings.error import RecordingError
 from ..sim.recordings.gaps import RULES
 from ..sim.recordings.load import load
 from ..sim.recordings.recording import Reading, Recording
 from ..sim.recordings.stamps import UNITS as TIME_UNITS
-from ..sim.recordings.steps import COUNTER_BITS
 from .errors import BadInput, one_line
 from .study import StudyOptions
 from .terminal import log, progress
@@ -57,10 +57,13 @@ class ReadingOptions(StudyOptions):
     counter_bits: Annotated[
         int | None,
         typer.Option(
-            min=COUNTER_BITS[0],
-            max=COUNTER_BITS[1],
-            help="width of the counter that wraps, bits",
-            show_default="found by its jumps",
+            min=BITS[0], max=BITS[1], help="width of the counter that wraps, bits", show_default="found by its jumps"
+        ),
+    ] = None
+    counter_modulus: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", min=MODULI[0], max=MODULI[1], help="range of a counter that wraps at another number, counts"
         ),
     ] = None
     gaps: Annotated[
@@ -90,6 +93,8 @@ class ReadingOptions(StudyOptions):
             raise BadInput(f"--count must be a positive number, or as 360/40000 or 2pi/2048, not {shown(self.count)}")
         if size is not None and self.unit == "counts":
             raise BadInput("--count needs --unit rad, deg, turns or m: it is the size of a count in that unit")
+        if self.counter_bits is not None and self.counter_modulus is not None:
+            raise BadInput("--counter-modulus and --counter-bits are both the range of the counter: give one of them")
         channels = tuple(each.strip() for each in self.channels.split(",")) if self.channels else ()
         if self.channels is not None and not CHANNELS[0] <= len(channels) <= CHANNELS[1]:
             raise BadInput(
@@ -101,6 +106,7 @@ class ReadingOptions(StudyOptions):
             unit=self.unit,
             count=size,
             counter_bits=self.counter_bits,
+            counter_modulus=self.counter_modulus,
             gaps=self.gaps,
             channels=channels,
         )
@@ -129,7 +135,7 @@ def say(recorded: Recording) -> None:
     log.print(one_line(said), style="dim", soft_wrap=True)
 
 
-READING = "rate", "time", "time_unit", "unit", "count", "counter_bits", "gaps", "channels"
+READING = "rate", "time", "time_unit", "unit", "count", "counter_bits", "counter_modulus", "gaps", "channels"
 """The names of the options of a recording."""
 
 

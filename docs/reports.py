@@ -5,7 +5,7 @@
 its command, the version, the date and the machine. Its origin is a digest of the code of every module that the command
 imports, except those that only show or keep results. Comments, docstrings, messages of errors and the help of options
 are no part of it. Where a command or its report names estimators, the others are no part of it either: a new estimator
-leaves most reports as they are.
+leaves most reports as they are. What reads recordings is a part only where a command names one.
 """
 
 import argparse
@@ -46,6 +46,8 @@ OF_HARDWARE = "axes", "bench", "bits", "board", "choose", "costs", "synth"
 """Commands that do."""
 HELP = "help", "metavar", "show_default"
 """Arguments of an option that only people read."""
+READING = "sim/recordings"
+"""The room that matters to a command that reads a recording."""
 REGISTRIES = "model/estimators/registry.py", "hdl/estimators/registry.py"
 """What imports every estimator."""
 OF_EVERY = "accuracy", "bench", "bits", "choose", "costs"
@@ -179,6 +181,12 @@ def _modules(name: str) -> tuple[str, str]:
     return ESTIMATORS[name], blocks.ESTIMATORS[name].__module__
 
 
+def _reads(words: list[str]) -> bool:
+    """Return whether a command reads a recording: a file of the project that is no scene."""
+    names = (word.partition(":")[0] for word in words if not word.endswith(".toml"))
+    return any((TREE / name).is_file() for name in names)
+
+
 def sources_of(command: str, report: Mapping[str, Any] = NOTHING) -> list[Path]:
     """Return the sources that the numbers of a command come from: what it imports, directly or not.
 
@@ -187,7 +195,7 @@ def sources_of(command: str, report: Mapping[str, Any] = NOTHING) -> list[Path]:
     words = shlex.split(command)
     chosen = _chosen(words, report)
     hardware = words[0] in OF_HARDWARE or "rtl" in words
-    others = (*SHOWING, *(() if hardware else HARDWARE))
+    others = (*SHOWING, *(() if hardware else HARDWARE), *(() if _reads(words) else (READING,)))
     own = TREE / "cli" / f"{words[0]}.py"
     registries = {TREE / name for name in REGISTRIES}
     waiting, seen = [own], set[Path]()

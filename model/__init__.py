@@ -1,13 +1,15 @@
 """Bit-accurate reference of every hardware block: integers in, the same integers as the RTL out.
 
-For studies: `velocity` and `velocity_of_edges` in one call, `VelocityEstimator` with its `Motion` for a record in
-pieces, and `Sampler` for a loop of one's own. They are loaded when they are first used; `__init__.pyi` has their types.
+For studies: `velocity` and `velocity_of_edges` in one call, `VelocityEstimator` and `EdgeVelocityEstimator` with their
+`Motion` for a record in pieces, and `Sampler` for a loop of one's own. They are loaded when they are first used;
+`__init__.pyi` has their types.
 """
 
 from importlib import import_module
 from typing import Any
 
 _HOMES = {
+    "EdgeVelocityEstimator": "edge_velocity_estimator",
     "Motion": "motion",
     "RecordWarning": "records",
     "Sampler": "sampler",

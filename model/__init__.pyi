@@ -1,3 +1,4 @@
+from .edge_velocity_estimator import EdgeVelocityEstimator as EdgeVelocityEstimator
 from .motion import Motion as Motion
 from .records import RecordWarning as RecordWarning
 from .records import velocity as velocity

@@ -7,19 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import checks
-from .axis.axis import Axis
-from .counter import check_bits, cure, unwrapped
-from .edge_times import clocks_of, samples_of, since_first
-from .encoder.level import level
+from .counter import check_span, cure, modulus_of, unwrapped
+from .edge_times import check_edges, samples_of, since, times_of
+from .edge_velocity_estimator import EdgeVelocityEstimator, default_clock_hz
 from .motion import Motion
-from .record_axis import DECODER_CLOCKS, axis_of
 from .record_time import RecordTime
-from .stamped import run
 from .velocity_estimator import VelocityEstimator, check_of_counts, is_floating, output_of
 
-CLOCK_HZ, CLOCKS = 100e6, 1 << 16
-"""The lowest rate of the stamping clock, Hz, unless a sample would then have more clocks than this number."""
-CLOCK_RANGE = 1e-6, 2.0**48
 BOUNDS = "speed_max", "travel", "jerk_max", "edge_error"
 """The bounds of a motion that are settings."""
 
@@ -58,9 +52,9 @@ def velocity(
         output: the estimator's output; None for its first.
         backend: `fixed` for the hardware's words, `float` for the same algorithm in float64 with unrounded gains.
         axis: the axis of time.
-        settings: further bounds (`speed_max`, unit/s; `travel`, unit; see `motion.Motion`). `count_bits`: the width of
-            a counter that wraps. `gains`: the estimator's gains. Others are run-time words by name, in seconds and the
-            unit of `count`. A word may be an array with a value for each lane: it is broadcast against the other axes.
+        settings: bounds (`speed_max`, unit/s; `travel`, unit; see `motion.Motion`). `count_bits` or `count_modulus`:
+            the range of a counter that wraps. `gains`: the estimator's gains. Others are run-time words, in seconds and the
+            unit of `count`, or arrays of them with a value a lane, broadcast against the other axes.
 
     Returns:
         float64 in the shape of the counts; if words are arrays, in the shape to which both broadcast.
@@ -81,9 +75,9 @@ def velocity(
     is_floating(backend)
     check_of_counts(estimator)
     output_of(estimator, output)
-    bits = settings.pop("count_bits", None)
-    check_bits(bits)
-    whole = unwrapped(array, bits)
+    modulus = modulus_of(settings.pop("count_bits", None), settings.pop("count_modulus", None))
+    check_span(array, modulus)
+    whole = unwrapped(array, modulus)
     motion, found = _motion(whole, sample_hz, count, acceleration_max, settings)
     taken = VelocityEstimator(sample_hz, estimator, motion, output, backend, **settings)
     made = taken(np.moveaxis(whole, -1, axis), axis)
@@ -104,8 +98,8 @@ def velocity_of_edges(
 ) -> np.ndarray:
     """Return the velocity at `sample_hz` from the times of an encoder's edges, as the hardware estimates it.
 
-    If two edges are more than a second and more than 1024 samples apart, the velocity may read 0 between them, as in
-    hardware.
+    Edges that are more than a second apart, and more than 1024 samples, may read as standstill, as in hardware.
+    `EdgeVelocityEstimator` takes a record in pieces.
 
     Args:
         times_s: s, shape (edges,), increasing: the start of the record, and the time of every edge. Integers (whole
@@ -126,28 +120,22 @@ def velocity_of_edges(
         As `velocity`; ValueError also if times do not increase, a count changes by another number than 1, or edges
         come faster than the clock.
     """
-    floating, output = is_floating(backend), output_of(estimator, output)
-    array = checks.integers("counts", counts)
-    since, unsure_s = since_first(times_s, array)
-    time = RecordTime(sample_hz)
+    RecordTime(sample_hz)
+    times, array = times_of(times_s), checks.integers("counts", counts)
+    if times.ndim != 1 or times.shape != array.shape or len(times) < 2:
+        raise ValueError(
+            f"times_s and counts must have one shape (edges,) of 2 or more, not {times.shape} and {array.shape}"
+        )
+    check_edges(times, array)
+    passed = since(times[0], times)
     clock_hz, gains = settings.pop("clock_hz", None), settings.pop("gains", None)
     if clock_hz is None:
-        clock_hz = max(min(CLOCK_HZ, CLOCKS * sample_hz), 1 / np.diff(since).min())
-    checks.check_number("clock_hz", clock_hz)
-    checks.check_range("clock_hz", clock_hz, *CLOCK_RANGE)
-    sampled = samples_of(since, array, sample_hz, unsure_s)
-    motion, found = _motion(sampled, sample_hz, count, acceleration_max, settings)
-    spec = axis_of(motion, time, estimator, gains, clock_hz / sample_hz)
-    design, timing = spec.design.estimator, spec.design.timing
-    words = time.words(word for word in design.words if word.name != design.output_word())
-    axis = Axis(spec, floating, **time.settings(words, settings), **design.choose(output))
-    clocks = clocks_of(since, sample_hz * spec.clocks_per_sample, unsure_s)
-    # The count at a strobe is the count DECODER_CLOCKS before it. The record starts at the strobe of sample 0.
-    first = timing.strobe - DECODER_CLOCKS
-    record = run(axis, first + clocks[1:], level(array[1:] - array[0]), len(sampled), int(level(0)))
-    _tell(found, spec.design.flag_names(int(record.flags[-1])))
-    lsb = 1.0 if floating else design.velocity.lsb
-    return record.velocity[1:] * (lsb * count * sample_hz)
+        clock_hz = max(default_clock_hz(sample_hz), 1 / np.diff(passed.since_s).min())
+    motion, found = _motion(samples_of(passed, array, sample_hz), sample_hz, count, acceleration_max, settings)
+    taken = EdgeVelocityEstimator(sample_hz, estimator, motion, output, backend, gains, clock_hz, **settings)
+    made = taken(times, array)
+    _tell(found, taken.flags)
+    return made
 
 
 def _motion(

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import checks
-from .counter import check_bits, cure, unwrapped
+from .counter import check_span, cure, modulus_of, unwrapped
 from .encoder.quadrature import seen_count
 from .estimators import registry
 from .estimators.estimate import EstimatorGains, estimate
@@ -76,7 +76,8 @@ class VelocityEstimator:
         backend: `fixed` for the hardware's words, `float` for the same algorithm in float64 with unrounded gains.
         gains: the estimator's `Gains` in seconds and the motion's unit; None for its default ones.
         count_bits: width of a counter that wraps, bits, 2 to 62: steps are taken modulo its range. None: it does not.
-        settings: run-time words by name, as of `set`.
+        settings: run-time words by name, as of `set`. Also, in place of `count_bits`, `count_modulus`: the number of
+            counts of a counter that wraps, 4 to 2**62, for instance 4000 for counts of 0 to 3999.
 
     Attributes:
         spec: the axis to which the estimator belongs; its unit of time is explained in `record_time`.
@@ -104,8 +105,7 @@ class VelocityEstimator:
         self._time, self._floating = RecordTime(sample_hz), is_floating(backend)
         check_of_counts(estimator)
         self._output = output_of(estimator, output)
-        check_bits(count_bits)
-        self._bits = count_bits
+        self._modulus = modulus_of(count_bits, settings.pop("count_modulus", None))
         self.spec = axis_of(motion, self._time, estimator, gains)
         self._design = self.spec.design.estimator
         self.words = self._time.words(word for word in self._design.words if word.name != self._design.output_word())
@@ -194,16 +194,19 @@ class VelocityEstimator:
 
     def _in_range(self, counts: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
         """Return counts of shape (lanes, samples) as words of the count's width: steps are taken modulo it."""
+        check_span(counts, self._modulus)
         last = counts[:, 0] if self._shape is None else self._last
-        whole = unwrapped(np.concatenate([last[:, None], counts], axis=-1), self._bits)
+        whole = unwrapped(np.concatenate([last[:, None], counts], axis=-1), self._modulus)
         half = 1 << (self.spec.count_width - 1)
         steps = np.diff(whole, axis=-1)
         if (wrong := np.argwhere((steps >= half) | (steps < -half))).size:
             lane, sample = wrong[0]
             step = int(steps[lane, sample])
+            hint = cure(step) or "; if the counter wraps, give count_bits or count_modulus"
             raise ValueError(
                 f"counts must change by less than {half} from sample to sample, half of the range that follows from "
-                f"the travel, not by {step} at sample {sample}{f' of lane {lane}' if lane else ''}{cure(step)}"
+                f"the travel, not by {step} at sample {sample}{f' of lane {lane}' if lane else ''}"
+                f"{'' if self._modulus else hint}"
             )
         self._shape, self._last = shape, whole[:, -1].copy()
         return ((whole[:, 1:] + half) & (2 * half - 1)) - half

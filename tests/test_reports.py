@@ -103,6 +103,17 @@ def test_what_only_shows_is_no_source_and_the_hardware_only_of_what_runs_it():
     assert ROOT / "hdl/axis/axis.py" in reports.sources_of("bench")
 
 
+def test_what_reads_recordings_is_a_source_only_of_a_command_that_names_one():
+    room = ROOT / "sim/recordings"
+    for command, reads in (
+        ("accuracy --signal paper", False),
+        ("accuracy --signal README.md:count", True),
+        ("replay README.md --column count", True),
+        ("zwidth docs/results/tuned.toml", False),
+    ):
+        assert any(path.is_relative_to(room) for path in reports.sources_of(command)) == reads
+
+
 @pytest.mark.parametrize(
     ("command", "own", "others"),
     [

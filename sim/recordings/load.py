@@ -8,6 +8,7 @@ import numpy as np
 
 from ...model.checks import shown
 from . import gaps
+from .counter import BITS
 from .counts import Counts, turn_of
 from .decoded import recording_of
 from .error import RecordingError, plain
@@ -15,7 +16,7 @@ from .forms import source_of
 from .logic_text import LogicTable
 from .recording import RATE_MAX_HZ, RATE_MIN_HZ, SAMPLES_MAX, Reading, Recording
 from .stamps import UNITS, Stamps, Times
-from .steps import COUNTER_BITS, Steps, Unwrapped
+from .steps import Steps, Unwrapped
 from .table import Table
 from .time_column import TIME_COLUMN, TimeColumn, place_of, time_column_of, unit_by_rate
 from .times import Sampled, check_mean
@@ -56,7 +57,7 @@ def load(
         raise RecordingError(f"{name}: is a capture of edges, which has no column: name its channels (--channels)")
     else:
         reading.refuse(name, "is a capture with times of its own", "time", "time_unit")
-    reading.refuse(name, "is a capture of edges", "unit", "count", "counter_bits", "gaps")
+    reading.refuse(name, "is a capture of edges", "unit", "count", "counter_bits", "counter_modulus", "gaps")
     return recording_of(source, str(path), reading.channels, rate_hz)
 
 
@@ -106,12 +107,12 @@ class _Counted:
     def _unwrapped(self, lines: np.ndarray, counts: np.ndarray, grid: gaps.Grid) -> Unwrapped:
         reading, turn = self._reading, turn_of(self._reading.unit, self._reading.count)
         steps = Steps(self._table, self._column, lines[grid.rows], counts[grid.rows], grid.passed, turn)
-        return steps.unwrapped(reading.counter_bits, reading.gaps != "refuse")
+        return steps.unwrapped(reading.counter, reading.gaps != "refuse")
 
     def _read(self) -> tuple[np.ndarray, Counts, Stamps | None]:
         """Return the lines, the counts and the times of all rows."""
         table, reading, time = self._table, self._reading, self._time
-        cells = Counts(table, self._column, reading.unit, reading.counter_bits == COUNTER_BITS[1])
+        cells = Counts(table, self._column, reading.unit, reading.counter_bits == BITS[1])
         stamps = Stamps(table, time.name, time.unit) if time is not None and not self._loose else None
         lines, ends = array("q"), []
         for chunk in table.chunks([self._place] if time is None else [self._place, time.place]):

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from ...model.requirements import RATES_HZ
+from .counter import Counter
 from .error import RecordingError
 
 SAMPLES_MAX = 10**7
@@ -26,7 +27,8 @@ class Reading:
         time_unit: one of `stamps.UNITS`, or `iso`.
         unit: one of `counts.UNITS`.
         count: size of a count in that unit; None for the unit `counts`.
-        counter_bits: width of the counter, 8 to 64; None to find it.
+        counter_bits: width of the counter, `counter.BITS`; None to find it.
+        counter_modulus: in its place, the counts of a counter that wraps at another number, `counter.MODULI`.
         gaps: one of `gaps.RULES`.
         channels: names or numbers of the channels A, B and, if there is one, Z of an edge capture.
     """
@@ -36,8 +38,16 @@ class Reading:
     unit: str = "counts"
     count: float | None = None
     counter_bits: int | None = None
+    counter_modulus: int | None = None
     gaps: str = "refuse"
     channels: tuple[str, ...] = ()
+
+    @property
+    def counter(self) -> Counter | None:
+        """The counter that is given; None to find it."""
+        if self.counter_modulus is not None:
+            return Counter.of_modulus(self.counter_modulus)
+        return None if self.counter_bits is None else Counter.of_bits(self.counter_bits)
 
     def refuse(self, name: str, what: str, *fields: str) -> None:
         """Raise RecordingError if some fields are given, which a file has no use for.

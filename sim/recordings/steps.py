@@ -9,17 +9,18 @@ Where the speed itself jumps, at an impact, the spread is that jump, and the ste
 recording, where one side is missing, the largest of the other steps stands for the spread. A single wrong sample makes
 two opposite steps, which do not support each other. Where samples are missing, a step may be any.
 
-The range of the counter. If its width is given, every step is taken modulo its range. If it is not, steps are taken
-modulo 2**`SPAN_BITS`. The range may be smaller if this leaves a step that is no motion, or the fastest step is over
-missing samples. For angles that span no more it is then one turn. For others it is the least power of two that holds
-all counts, 8 to 31 bits, provided that
+The range of the counter. If its width or its range is given, every step is taken modulo this range. If it is not, steps
+are taken modulo 2**`SPAN_BITS`. The range may be smaller if this leaves a step that is no motion, or the fastest step
+is over missing samples. For angles that span no more it is then one turn. For others it is the least power of two that
+holds all counts, 8 to 31 bits, provided that
 
 - every step across the end of the range, once unwrapped, is close to the median of its neighbours: within their spread,
-  or `CLOSE` of the smallest steps; over missing samples it is no faster than the other steps; and
+  or `CLOSE` times the number that divides all steps; over missing samples it is no faster than the other steps; and
 - no step is longer than a quarter of the range, so that its direction is beyond doubt.
 
-If a file does not meet both, its fault is no wrapped counter, and it is refused. Of a width that is given, a step
-across the end may differ by `JUMP` times the spread.
+If a file does not meet both, its fault is no wrapped counter, and it is refused. Of a range that is given, a step
+across the end may differ by `JUMP` times the spread. Other ranges than powers of two are not found. If a step goes from
+one end of all counts to the other, the message says which range would fit.
 """
 
 from collections.abc import Iterator, Sequence
@@ -28,6 +29,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .counter import BITS, MODULI, Counter
 from .error import RecordingError, plain
 from .table import Table
 
@@ -36,13 +38,13 @@ BESIDE = 3
 JUMP, FLOOR = 4, 8
 """How often the spread a step may be off, and the least spread in smallest steps: single counts are no jump."""
 CLOSE = 2
-"""How many smallest steps a step across the end of a range may be off."""
+"""How often the number that divides all steps a step across the end of a range may be off."""
 WRAP_BITS = range(8, SPAN_BITS)
-"""The counter widths that are found, and suggested in messages."""
-COUNTER_BITS = 8, 64
-"""The widths of counters that can be given."""
+"""The widths of counters that are found, and that a message knows."""
 LARGEST = 1 << 61
 CHUNK = 1 << 16
+ROUND = 100
+"""Ranges of counters are often multiples of this number."""
 
 
 class Unwrapped(NamedTuple):
@@ -89,28 +91,28 @@ class Steps:
     def _where(self, sample: int) -> str:
         return f"{self._table.at(self._lines[sample])}, column {plain(self._column)}"
 
-    def unwrapped(self, bits: int | None, may_stand: bool) -> Unwrapped:
+    def unwrapped(self, counter: Counter | None, may_stand: bool) -> Unwrapped:
         """Return the counts without wraps.
 
         Args:
-            bits: width of the counter; None to find it.
+            counter: the counter; None to find it.
             may_stand: whether a sensor may stand and then jump.
 
         Raises:
             RecordingError: if the counts span too much, or a step is no motion.
         """
-        self._check_span(bits)
-        size = 1 << (bits or SPAN_BITS)
+        self._check_span(counter)
+        size = counter.size if counter else 1 << SPAN_BITS
         steps, notes = _modulo(self._counts, size), []
-        found = self._found(steps) if bits is None else None
+        found = self._found(steps) if counter is None else None
         if found is not None:
             size, steps = found, _modulo(self._counts, found)
-        wraps = steps != _modulo(self._counts, 1 << COUNTER_BITS[1])
-        if wraps.any() or bits or found:
-            what = "an angle" if found and found == self._turn else f"a counter of {size.bit_length() - 1} bits"
+        wraps = steps != _modulo(self._counts, 1 << BITS[1])
+        if wraps.any() or counter or found:
+            what = "an angle" if found and found == self._turn else str(counter or Counter(size, "--counter-bits"))
             notes.append(f"{what} that wrapped {np.count_nonzero(wraps)} times")
-        if bits is not None:
-            self._check_width(bits, steps, wraps)
+        if counter is not None:
+            self._check_range(counter, steps, wraps)
         cuts = self._check(steps, may_stand)
         if np.abs(np.cumsum(steps, dtype=np.float64)).max() >= LARGEST:
             raise RecordingError(f"{self._where(0)}: counts must stay within 2**61 of the first, unwrapped")
@@ -121,16 +123,17 @@ class Steps:
             notes.append(f"counted from the first, {first}")
         return Unwrapped(counts, cuts, notes)
 
-    def _check_span(self, bits: int | None) -> None:
+    def _check_span(self, counter: Counter | None) -> None:
         """Raise RecordingError if the counts do not fit the counter."""
-        if bits == COUNTER_BITS[1]:
+        size, range_of = (counter.size, counter.range) if counter else (1 << SPAN_BITS, f"2**{SPAN_BITS}")
+        if size >> BITS[1]:
             return
-        wide = np.flatnonzero(self._spread >> np.uint64(bits or SPAN_BITS))
+        wide = np.flatnonzero(self._spread >= np.uint64(size))
         if len(wide):
-            cure = ": give a larger --counter-bits" if bits else ""
+            cure = f": give a larger {counter.option}" if counter else ""
             raise RecordingError(
-                f"{self._where(wide[0])}: counts must span less than 2**{bits or SPAN_BITS}, "
-                f"not {self._spread[wide[0]]} up to here{cure}"
+                f"{self._where(wide[0])}: counts must span less than {range_of}, not {self._spread[wide[0]]} "
+                f"up to here{cure}"
             )
 
     def _found(self, steps: np.ndarray) -> int | None:
@@ -152,22 +155,22 @@ class Steps:
 
     def _misfits(self, within: np.ndarray, wraps: np.ndarray, spreads: int) -> np.ndarray:
         """Return the steps across the end of a range that differ from their neighbours: by more than so many spreads,
-        and `CLOSE` of the smallest steps."""
+        and `CLOSE` times the number that divides all steps."""
         places = np.flatnonzero(wraps & ~self._gaps)
         if len(within) <= 2 * BESIDE or not len(places):
             return places[:0]
         usual, spread = _around(within, places)
-        near = np.maximum(spreads * spread, CLOSE * _smallest(within))
+        near = np.maximum(spreads * spread, CLOSE * float(np.gcd.reduce(within)))
         return places[np.abs(within[places] - usual) > near]
 
-    def _check_width(self, bits: int, steps: np.ndarray, wraps: np.ndarray) -> None:
-        """Raise RecordingError if a given width makes misfitting steps across the end of its range."""
+    def _check_range(self, counter: Counter, steps: np.ndarray, wraps: np.ndarray) -> None:
+        """Raise RecordingError if a given range makes misfitting steps across its end."""
         wrong = self._misfits(steps, wraps, JUMP)
         if len(wrong):
             usual, _ = _around(steps, wrong[:1])
             raise RecordingError(
-                f"{self._where(wrong[0] + 1)}: the count must not go by {steps[wrong[0]]}, as a counter of {bits} bits "
-                f"that wrapped there, where {usual[0]:g} is usual beside it: correct --counter-bits, or leave it out"
+                f"{self._where(wrong[0] + 1)}: the count must not go by {steps[wrong[0]]}, as {counter} "
+                f"that wrapped there, where {usual[0]:g} is usual beside it: correct {counter.option}, or leave it out"
             )
 
     @cached_property
@@ -198,14 +201,17 @@ class Steps:
     def _cure(self, steps: np.ndarray, place: int, off: float, spread: float, held: int) -> str:
         """Return the probable cause of a step that is `off` by so much, and the remedy."""
         count, cut, least = int(self._counts[place + 1]), "cut the recording at this line", _smallest(steps)
-        close = max(spread, CLOSE * least)
+        close = max(spread, CLOSE * float(np.gcd.reduce(steps)))
         if self._turn is not None and abs(abs(off) - self._turn) <= close:
             return "if the angle wrapped at a turn, unwrap it before: it is too fast here to tell its direction"
         bits = next((bits for bits in WRAP_BITS if abs(abs(off) - 2.0**bits) <= close), None)
         if bits is not None:
             return f"if a counter of {bits} bits wrapped, give --counter-bits {bits}"
+        cures = [self._modulus_cure(steps, abs(off), close)]
         if abs(count) <= max(spread, FLOOR * least):
-            return f"if the counter was set to 0, add {-round(off)} in this line and all after it, or {cut}"
+            cures.append(f"if the counter was set to 0, add {-round(off)} in this line and all after it, or {cut}")
+        if any(cures):
+            return "; ".join(filter(None, cures))
         if held > BESIDE:
             return (
                 f"if the sensor or its reading stood, for {held} samples before it, take it so (--gaps hold), or keep "
@@ -213,12 +219,24 @@ class Steps:
             )
         return f"correct this line, or {cut}"
 
+    def _modulus_cure(self, steps: np.ndarray, off: float, close: float) -> str:
+        """Return what to say of a step off by as much as all counts span, which another counter may have made; empty
+        for another step."""
+        least, reach = int(self._spread[-1]) + 1, close + float(np.median(np.abs(steps)))
+        jumps = [abs(steps[place] - usual) for place, usual, _ in _jumps(steps, self._gaps)]
+        likely = max(float(np.mean([each for each in jumps if abs(each - off) <= reach])), least)
+        if abs(off - least) > reach or not MODULI[0] <= likely <= MODULI[1]:
+            return ""
+        near = round(likely / ROUND) * ROUND
+        modulus = near if near >= least and abs(near - likely) <= close else round(likely)
+        return f"if a counter of about {modulus} counts wrapped, give the exact number, as --counter-modulus {modulus}"
+
 
 def _modulo(counts: np.ndarray, size: int) -> np.ndarray:
     """Return the steps of counts of a counter of a range, each the shortest way."""
     with np.errstate(over="ignore"):
         steps = np.diff(counts)
-        if size == 1 << COUNTER_BITS[1]:
+        if size == 1 << BITS[1]:
             return steps
         half = np.int64(size // 2)
         if size & (size - 1):

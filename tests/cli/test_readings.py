@@ -73,6 +73,15 @@ def test_accuracy_takes_a_column_in_other_units(monkeypatch, capsys, folder, fre
     assert (code, row["signal"], row["sample_hz"]) == (0, "log.csv:angle", 500.0)
 
 
+def test_a_counter_of_a_turn_is_read_by_its_modulus(monkeypatch, capsys, folder):
+    (folder / "turn.csv").write_text("counts\n" + "".join(f"{7 * k % 4000}\n" for k in range(2000)))
+    words = ["turn.csv", "--column", "counts", "--rate", "1000", "--estimator", "fdm"]
+    code, _, err = call(monkeypatch, capsys, "replay", *words)
+    assert (code, "give the exact number, as --counter-modulus 4000" in " ".join(err.split())) == (2, True)
+    code, _, err = call(monkeypatch, capsys, "replay", *words, "--counter-modulus", "4000")
+    assert (code, "a counter of 4000 counts that wrapped 3 times" in err) == (0, True)
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -83,6 +92,14 @@ def test_accuracy_takes_a_column_in_other_units(monkeypatch, capsys, folder, fre
         (["--column", "angle", "--unit", "feet"], "--unit must be "),
         (["--column", "angle", "--gaps", "fill"], "--gaps must be "),
         (["--column", "angle", "--counter-bits", "7"], "--counter-bits must be "),
+        (
+            ["--column", "angle", "--counter-modulus", "3"],
+            "--counter-modulus must be a whole number of 4 to 4611686018427387904, not '3'",
+        ),
+        (
+            ["--column", "angle", "--counter-modulus", "9", "--counter-bits", "8"],
+            "both the range of the counter: give one",
+        ),
         (["--channels", "A"], "--channels must be two or three names or numbers, A,B or A,B,Z, not 'A'"),
         (
             ["--channels", "A,B", "--rate", "1", "--time", "Zeit"],

@@ -85,6 +85,13 @@ def test_a_counter_that_wraps_is_named_and_unwrapped():
         velocity(wrapped, 1e3, "fdm")
 
 
+def test_a_counter_of_a_turn_is_unwrapped():
+    counts = np.cumsum(rng().integers(-900, 1000, 5000))
+    bounds = {"acceleration_max": 1e6, "speed_max": 2e6, "travel": 1e6}
+    made = velocity(counts, 1e3, "kalman", **bounds)
+    assert velocity(counts % 4000, 1e3, "kalman", count_modulus=4000, **bounds).tolist() == made.tolist()
+
+
 def test_no_lanes_are_no_velocities():
     assert velocity(np.zeros((0, 5), np.int64), 1e3).shape == (0, 5)
 
@@ -203,7 +210,7 @@ def test_what_velocity_of_edges_refuses():
         refused([0.0, 1.0, 1.0], [0, 1, 2])
     with pytest.raises(ValueError, match="times_s must be finite, not nan at element 1"):
         refused([0.0, np.nan, 1.0], [0, 1, 2])
-    with pytest.raises(TypeError, match="times_s must be numbers, not <U1"):
+    with pytest.raises(TypeError, match="times_s must be numbers or datetime64, not <U1"):
         refused(["0", "1"], [0, 1])
     with pytest.raises(ValueError, match="counts must change by 1 at an edge, not by 2 at element 2"):
         refused([0.0, 1.0, 2.0], [0, 1, 3])
@@ -213,9 +220,53 @@ def test_what_velocity_of_edges_refuses():
         refused([0.0, 0.123456, 0.123456 + 1e-9], [0, 1, 2], clock_hz=1e6)
     with pytest.raises(ValueError, match=r"period has no words for this motion \(as if 1024 samples were a second: "):
         refused([0.0, 1.0, 1.0 + 1e-9], [0, 1, 2])
-    with pytest.raises(ValueError, match=r"at most 1e\+08 samples at 1000 Hz, not 2e\+09 in 2e\+06 s: are they in s"):
+    with pytest.raises(
+        ValueError, match=r"at most 1e\+08 samples at 1000 Hz, not 2e\+09 in 2e\+06 s: are they in seconds\?"
+    ):
         refused([0, 10**6, 2 * 10**6], [0, 1, 2], 1000.0)
     with pytest.raises(ValueError, match=r"clock_hz must be 1e-06 to 2.81475e\+14, not nan"):
         refused([0.0, 1.0], [0, 1], clock_hz=np.nan)
     with pytest.raises(TypeError, match="clock_hz must be a number, not 'x'"):
         refused([0.0, 1.0], [0, 1], clock_hz="x")
+
+
+SECONDS = np.datetime64("2026-11-29T10:00:00") + np.arange(20) // 4
+MANY = np.arange(2000)
+
+
+@pytest.mark.parametrize(
+    ("times", "error", "said"),
+    [
+        (SECONDS, ValueError,
+         "times_s must increase, not from 2026-11-29T10:00:00 to 2026-11-29T10:00:00 at element 1; 15 of 19 are as the "
+         "one before: give times fine enough to tell edges apart"),
+        (SECONDS[::-4], ValueError,
+         "times_s must increase, not from 2026-11-29T10:00:04 to 2026-11-29T10:00:03 at element 1"),
+        (1.7e9 + np.arange(20) * 1e-9, ValueError,
+         "times_s must increase, not from 1700000000.0 to 1700000000.0 at element 1; 19 of 19 are as the one before: "
+         "give times fine enough to tell edges apart"),
+        (MANY * 10**6, ValueError,
+         "times_s must last at most 1e+08 samples at 1000 Hz, not 1.999e+12 in 1.999e+09 s: are they in seconds? Times "
+         "in ms, us or ns may be datetime64 of that unit"),
+        ((MANY * 10**6).astype("M8[s]"), ValueError,
+         "times_s must last at most 1e+08 samples at 1000 Hz, not 1.999e+12 in 1.999e+09 s: are they in seconds? Times "
+         "in ms, us or ns may be datetime64 of that unit"),
+        (MANY.astype("M8[ns]"), ValueError,
+         "times_s must last a sample of 0.001 s or more, not 1.999e-06 s: are they in seconds? Times in ms, us or ns "
+         "may be datetime64 of that unit"),
+        (MANY.astype("m8[ms]"), TypeError,
+         "times_s must be numbers or datetime64, not timedelta64[ms]: divide them by np.timedelta64(1, 's')"),
+        (MANY.astype("M8[M]"), TypeError, "times_s must be datetime64 in days or a finer unit, not datetime64[M]"),
+        (np.array([-(2**62), 2**62]).view("M8[ns]"), ValueError,
+         "times_s must last less than 2**63 ns: give datetime64[ns] in a coarser unit"),
+    ],
+)  # fmt: skip
+def test_times_of_a_wrong_unit_say_what_to_do(times, error, said):
+    with pytest.raises(error) as caught:
+        velocity_of_edges(times, np.arange(len(times)), 1e3, "period", **BOUNDS)
+    assert str(caught.value) == said
+
+
+def test_times_in_a_unit_of_their_own_are_those_in_seconds():
+    made = velocity_of_edges(MANY * 1e-3, MANY, 100.0, "period", **WIDE)
+    assert velocity_of_edges(MANY.astype("M8[ms]"), MANY, 100.0, "period", **WIDE).tolist() == made.tolist()

@@ -174,7 +174,10 @@ def test_what_is_refused():
     taken(swing(10))
     with pytest.raises(ValueError, match=r"lanes must have the shape \(\) as before, not \(2,\)"):
         taken(np.zeros((2, 5), np.int64))
-    with pytest.raises(ValueError, match=r"must change by less than 1048576 .* not by 2000000 at sample 1$"):
+    with pytest.raises(
+        ValueError,
+        match=r"must change by less than 1048576 .* not by 2000000 at sample 1; if the counter wraps, give c",
+    ):
         taken(np.array([0, 2_000_000]))
     with pytest.raises(ValueError, match=r"counts have lanes of shape \(2,\), and levant_lambda has the shape \(3,\)"):
         VelocityEstimator(RATE, "levant", MOTION, levant_lambda=[2.0, 3.0, 4.0])(np.zeros((2, 5), np.int64))
@@ -202,6 +205,40 @@ def test_counters_of_a_few_bits_are_unwrapped_in_pieces():
         VelocityEstimator(RATE, "fdm", replace(MOTION, travel=1e-3))([65535, 3])
     with pytest.raises(ValueError, match="count_bits must be 2 to 62, not 1"):
         VelocityEstimator(RATE, "fdm", MOTION, count_bits=1)
+
+
+@pytest.mark.parametrize("modulus", [1500, 4000, 4001, 65_536, 10**6])
+def test_counters_of_any_modulus_are_unwrapped_in_pieces(modulus):
+    counts = swing()
+    true = VelocityEstimator(RATE, "kalman", MOTION)(counts)
+    for read in (counts % modulus, (counts + modulus // 2) % modulus - modulus // 2):
+        taken = VelocityEstimator(RATE, "kalman", MOTION, count_modulus=modulus)
+        pieces = np.concatenate([taken(read[:777]), taken(read[777:778]), taken(read[778:])])
+        assert pieces.tolist() == true.tolist()
+
+
+def test_the_largest_modulus_is_unwrapped_exactly():
+    modulus = 2**62
+    counts = np.array([2**62 - 3, 2**62 - 1, 1, 2**62 - 2, 0, 4])
+    taken = VelocityEstimator(
+        1.0, "fdm", Motion(acceleration_max=9.0, speed_max=9.0, travel=99.0), count_modulus=modulus
+    )
+    assert taken(counts).tolist() == [0.0, 2.0, 2.0, -3.0, 2.0, 4.0]
+
+
+def test_a_modulus_that_is_refused():
+    for modulus, error, said in (
+        (3, ValueError, "count_modulus must be 4 to 4611686018427387904, not 3"),
+        (4e3, TypeError, "count_modulus must be an int, not 4000.0"),
+    ):
+        with pytest.raises(error, match=said):
+            VelocityEstimator(RATE, "fdm", MOTION, count_modulus=modulus)
+    with pytest.raises(ValueError, match="count_modulus and count_bits are both the range of the counter: give one"):
+        VelocityEstimator(RATE, "fdm", MOTION, count_bits=16, count_modulus=4000)
+    taken = VelocityEstimator(RATE, "fdm", MOTION, count_modulus=400)
+    with pytest.raises(ValueError, match="counts must span less than the 400 counts of their counter, not 400"):
+        taken([0, 30, 400])
+    assert taken([0, 30, 399]).tolist() == pytest.approx([0.0, 0.3, -0.31])
 
 
 def test_a_call_that_is_refused_leaves_no_trace():

@@ -116,6 +116,7 @@ def test_the_index_is_said(read):
         ({"rate_hz": 10.0, "channels": ("1", "1")}, "A, B and Z must be different channels, not A, A"),
         ({"rate_hz": 10.0, "unit": "rad"}, "is a capture of edges, so --unit must be absent"),
         ({"rate_hz": 10.0, "counter_bits": 16}, "is a capture of edges, so --counter-bits must be absent"),
+        ({"rate_hz": 10.0, "counter_modulus": 9}, "is a capture of edges, so --counter-modulus must be absent"),
         ({"rate_hz": 10.0, "gaps": "hold", "count": 2.0}, "so --count and --gaps must be absent"),
         ({"rate_hz": 10.0, "time": "t"}, "is a capture with times of its own, so --time must be absent"),
         ({"rate_hz": 10.0, "time_unit": "s"}, "is a capture with times of its own, so --time-unit must be absent"),

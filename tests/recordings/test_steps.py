@@ -188,6 +188,60 @@ def test_a_width_that_does_not_fit_is_neither_advised_nor_accepted(refused, size
     )
 
 
+def column(counts) -> str:
+    return "counts\n" + "".join(f"{count}\n" for count in counts)
+
+
+@pytest.mark.parametrize("modulus", [4, 5, 360, 4000, 12_345, 10**9, 2**62])
+@pytest.mark.parametrize("shift", [0, 1])
+def test_a_modulus_that_is_given_is_used(read, modulus, shift):
+    """Of a counter from 0 on, or of one with signs."""
+    exact = np.cumsum(np.round(min(20, modulus // 4) * np.sin(np.arange(500) / 60)).astype(int))
+    counts = [int(count) % modulus for count in exact]
+    counts = [count - (modulus if shift and count >= modulus // 2 else 0) for count in counts]
+    if modulus == 2**62 and not shift:
+        counts = [min(count, 2**61 - 1) for count in np.abs(exact)]
+        exact = np.array(counts)
+    found = read(column(counts), rate_hz=1000, counter_modulus=modulus)
+    assert (np.diff(found.counts) == np.diff(exact)).all()
+    assert f"a counter of {modulus} counts that wrapped" in found.notes[-1]
+
+
+@pytest.mark.parametrize("modulus", [360, 1440, 4000, 10_000, 12_345])
+@pytest.mark.parametrize("speed", [0.1, 1.0, 5.3, -5.3])
+def test_a_modulus_that_is_no_power_of_two_is_advised(read, refused, modulus, speed):
+    exact = np.floor(speed * np.arange(5 * modulus // min(abs(speed), 1))).astype(int)[:: 1 + modulus // 4000]
+    said = refused(column(exact % modulus), rate_hz=1000)
+    assert f"a counter of about {modulus} counts wrapped, give the exact number, as --counter-modulus {modulus}" in said
+    assert "--counter-bits" not in said
+    found = read(column(exact % modulus), rate_hz=1000, counter_modulus=modulus)
+    assert (np.diff(found.counts) == np.diff(exact)).all()
+
+
+@pytest.mark.parametrize(("modulus", "speed"), [(4000, 75.4), (12_345, 151.7)])
+def test_a_modulus_is_advised_where_the_counter_passes_its_end_fast(refused, modulus, speed):
+    """It was taken for the next power of two where all steps are large."""
+    exact = np.floor(speed * np.arange(3000)).astype(int)
+    said = refused(column(exact % modulus), rate_hz=1000)
+    assert said.partition(": if ")[2].startswith(f"a counter of about {modulus} counts wrapped")
+
+
+@pytest.mark.parametrize("counts", [zeroed(), held(), one_wrong()], ids=["set to 0", "held", "one wrong"])
+def test_a_modulus_is_not_advised_for_another_fault(refused, counts):
+    assert "--counter-modulus" not in refused(column(counts), rate_hz=1000)
+
+
+def test_a_modulus_that_does_not_fit_is_refused(refused):
+    counts = np.arange(3000) * 7 % 4000
+    assert refused(column(counts), rate_hz=1000, counter_modulus=4100).endswith(
+        "the count must not go by 107, as a counter of 4100 counts that wrapped there, where 7 is usual beside it: "
+        "correct --counter-modulus, or leave it out"
+    )
+    assert refused(column(counts), rate_hz=1000, counter_modulus=3000).endswith(
+        "counts must span less than 3000, not 3003 up to here: give a larger --counter-modulus"
+    )
+
+
 @pytest.mark.parametrize("noise", [1, 30])
 def test_a_width_that_is_given_is_accepted_where_the_speed_varies(read, noise):
     """Of thousands of wraps some differ from the steps beside them by more than their spread."""

@@ -62,6 +62,7 @@ GOOD: dict[str, tuple[str, ...]] = {
     "unit": ("counts", "rad"),
     "count": ("1", "2pi/2048"),
     "counter_bits": ("16", "32"),
+    "counter_modulus": ("4000",),
     "gaps": ("refuse", "hold", "split"),
     "channels": ("1,2", "A,B"),
     "coarsen": ("1", "4"),

@@ -21,7 +21,7 @@ from stimuli.specs import spec
 
 FILE = Path(__file__).with_name("promised.txt")
 PYTHON = (
-    *(("model", name) for name in ("Motion", "Sampler", "VelocityEstimator")),
+    *(("model", name) for name in ("EdgeVelocityEstimator", "Motion", "Sampler", "VelocityEstimator")),
     *(("model", name) for name in ("velocity", "velocity_of_edges")),
     *(("model.axis", "Axis"), ("model.axis", "step"), ("model.spec", "AxisSpec"), ("model.stamped", "run")),
     ("hdl.verilog_module", "VerilogModule"),
