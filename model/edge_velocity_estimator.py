@@ -62,8 +62,8 @@ class EdgeVelocityEstimator:
         first = estimator(times_s[:500], counts[:500])
         second = estimator(times_s[500:], counts[500:])
 
-    All pieces together have the velocities of `velocity_of_edges`. `copy.deepcopy` and `pickle` keep the state, to go on
-    from it twice, or elsewhere.
+    All pieces together have the velocities of `velocity_of_edges`. `copy.deepcopy` and `pickle` keep the state, to go
+    on from it twice, or elsewhere.
 
     Args:
         sample_hz: rate of the velocities, Hz; it need not be whole.

@@ -53,8 +53,8 @@ def velocity(
         backend: `fixed` for the hardware's words, `float` for the same algorithm in float64 with unrounded gains.
         axis: the axis of time.
         settings: bounds (`speed_max`, unit/s; `travel`, unit; see `motion.Motion`). `count_bits` or `count_modulus`:
-            the range of a counter that wraps. `gains`: the estimator's gains. Others are run-time words, in seconds and the
-            unit of `count`, or arrays of them with a value a lane, broadcast against the other axes.
+            the range of a counter that wraps. `gains`: the estimator's gains. Others are run-time words, in seconds and
+            the unit of `count`, or arrays of them with a value a lane, broadcast against the other axes.
 
     Returns:
         float64 in the shape of the counts; if words are arrays, in the shape to which both broadcast.
