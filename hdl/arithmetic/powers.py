@@ -1,6 +1,6 @@
 """Fractional powers of a magnitude, times constants, from its leading bits."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal, Value
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib.wiring import In, Member, Out
 
 from hardwall.model.arithmetic.powers import STEP_BITS, Design
@@ -55,7 +55,7 @@ class Powers(Block):
         m = Module()
         design = self.design
         run = Signal(design.latency)
-        m.d.sync += run.eq(Cat(self.start, run))
+        m.d.sync += run.eq(Cat(self.start, run[:-1]))
         m.d.comb += self.done.eq(run[-1])
 
         # The shift, by large steps and then by the last three. `up` counts it; zeros come in from below.
@@ -81,7 +81,7 @@ class Powers(Block):
             down = Signal(
                 range(most + 1 - int(design.params.shifts[number]) - design.octaves[0]), name=f"down_{number}"
             )
-            amount = term.power * quotient + self.octaves + int(design.params.shifts[number])
+            amount = _times(quotient, term.power) + self.octaves + int(design.params.shifts[number])
             m.d.sync += [
                 value.eq(Mux(empty, 0, _entry(m, entry, table, f"table_{number}"))),
                 down.eq(most - amount),
@@ -97,6 +97,11 @@ class Powers(Block):
             return octave[bits:], octave[:bits]
         both = _entry(m, octave, [each // degree << bits | each % degree for each in range(depth)], "divided")
         return both[bits:], both[:bits]
+
+
+def _times(value: Value, factor: int) -> Value:
+    """Return a value times a small constant, by shifts and sums: a product would take a multiplier of the part."""
+    return sum((value << place for place in range(factor.bit_length()) if factor >> place & 1), Const(0))
 
 
 def _raised(value: Value, steps: list[int], later: int) -> tuple[Value, Value]:

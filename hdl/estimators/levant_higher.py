@@ -63,7 +63,7 @@ class Estimator(EstimatorBlock):
         sums = self._taylor(m, states, gap)
         corrections = [*self._terms(powers), Mux(still, 0, self._relay(m, octaves))]
 
-        m.d.comb += self.velocity.eq(z[0][-len(self.velocity) :])
+        m.d.comb += self.velocity.eq(z[0] >> design.z[0].f - design.velocity.f)
         m.d.sync += [self.valid.eq(0), powers.start.eq(0)]
         with m.FSM():
             first = arrive(m, self, led, lead, design.gap.f, "MAGNITUDE")
@@ -73,7 +73,7 @@ class Estimator(EstimatorBlock):
                 m.d.sync += [
                     gap.eq(near),
                     over.eq(~fits(led, design.gap.width)),
-                    powers.size.eq(error ^ error[-1].replicate(len(error))),
+                    powers.size.eq((error ^ error[-1].replicate(len(error)))[:-2]),
                     negative.eq(error[-1]),
                     still.eq(error == 0),
                     powers.start.eq(1),
