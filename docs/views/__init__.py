@@ -26,6 +26,7 @@ VIEWS: dict[str, Callable[..., list[str]]] = {
     "devices": walls.devices,
     "frictions": walls.frictions,
     "hands": walls.hands,
+    "gains": walls.gains,
     "cutoffs": walls.cutoffs,
     "cures": walls.cures,
     "stiffest": walls.stiffest,

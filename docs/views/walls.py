@@ -127,6 +127,26 @@ def cutoffs(*reports: Report) -> list[str]:
     return table(heads, rows)
 
 
+def gains(report: Report) -> list[str]:
+    """Return the areas with the gains that the paper gives and with the best, of both outputs of Levant's estimator."""
+    heads = ["output, gains", "lambda (√m/s)", "alpha (m/s²)", AREA, "stable part of it", "in place"]
+    rows = []
+    for output, found in report["outputs"].items():
+        for name, pick in found["picks"].items():
+            part = pick["area_in_place_n2_s_per_m2"] / pick["area_n2_s_per_m2"]
+            rows.append(
+                [
+                    f"{output}, {name}",
+                    number(pick["lambda_sqrt_m_per_s"]),
+                    number(pick["alpha_m_per_s2"]),
+                    _area(pick),
+                    _held(pick),
+                    f"{number(100 * part, 2)} %",
+                ]
+            )
+    return table(heads, rows)
+
+
 def cures(report: Report) -> list[str]:
     """Return the regions of the methods of `hardwall drop`, the largest first, in parts of the paper's best."""
     ordered = _by_area(report["methods"].values())
