@@ -112,7 +112,7 @@ def test_it_neither_drifts_nor_stops_short(estimator, speed):
     fmt = axis.design.estimator.velocity
     assert all(fmt.min <= low <= high <= fmt.max for low, high, _ in seen)
     # The words repeat themselves in time, so an extreme that a tenth of the run does not reach is not reached later.
-    # With filtering they nearly do: the extremes of a count's ripple wander by a hundredth of it.
+    # With filtering they nearly do: the extremes of a count's ripple wander by a fiftieth of it at most.
     low, high, _ = seen[SETTLED - 1]
     within = 1 + ((high - low) // 50 if estimator.endswith("-filtering") else 0)
     assert min(low for low, _, _ in seen[SETTLED:]) >= low - within

@@ -15,8 +15,8 @@ With D = P - fraction - k, its quotient Q and rest R of the division by g,
 so a term is an entry of a table of 8 g, shifted. D is made positive by a multiple of g.
 
 Rounding. An entry stands for all mantissas of an eighth: it is the one with the least relative error, which is below
-(n / g) / 16. Its word has `MANTISSA_BITS` behind its leading one, at
-least, so rounding it adds 2**-(MANTISSA_BITS + 1). A shift to the right rounds down. A magnitude of 0 has terms of 0.
+(n / g) / 16. Its word has `MANTISSA_BITS` behind its leading one, at least, so rounding it adds
+2**-(MANTISSA_BITS + 1). A shift to the right rounds down. A magnitude of 0 has terms of 0.
 
 Source: splitting a number into its octave and what is left is how tables of logarithms have always been read; the
 arithmetic here is this project's own.
