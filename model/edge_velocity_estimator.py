@@ -62,8 +62,8 @@ class EdgeVelocityEstimator:
         first = estimator(times_s[:500], counts[:500])
         second = estimator(times_s[500:], counts[500:])
 
-    All pieces together have the velocities of `velocity_of_edges`. `copy.deepcopy` and `pickle` keep the state, to go
-    on from it twice, or elsewhere.
+    All pieces together have the velocities of `velocity_of_edges`, except at an edge right behind `until_s` (see there).
+    `copy.deepcopy` and `pickle` keep the state, to go on from it twice, or elsewhere.
 
     Args:
         sample_hz: rate of the velocities, Hz; it need not be whole.
@@ -152,7 +152,8 @@ class EdgeVelocityEstimator:
             counts: integers of the same shape: the count after every edge; the first belongs to the start. An edge
                 changes it by 1, also from one piece to the next.
             until_s: all edges up to this time, and at it, are now given, so that samples up to it are complete. None:
-                the last of the times. It brings the velocities of a standstill, at which no edge comes.
+                the last of the times. It brings the velocities of a standstill, at which no edge comes. An edge that is
+                later by less than its time is sure (two units in the last place) counts for the next sample.
 
         Returns:
             float64, shape (samples,), which may be 0: the velocities at start + k / sample_hz, from the first k that no
