@@ -62,7 +62,7 @@ class EdgeVelocityEstimator:
         first = estimator(times_s[:500], counts[:500])
         second = estimator(times_s[500:], counts[500:])
 
-    All pieces together have the velocities of `velocity_of_edges`, except at an edge right behind `until_s` (see there).
+    All pieces together have the velocities of `velocity_of_edges`, except at an edge just after `until_s` (see there).
     `copy.deepcopy` and `pickle` keep the state, to go on from it twice, or elsewhere.
 
     Args:
