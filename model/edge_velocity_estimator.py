@@ -1,7 +1,7 @@
 """A velocity estimator of the hardware for records of edges, whole or in pieces.
 
 A sample is complete when no later edge can count for it: when an edge is at its time or later, or when the caller says
-that all edges up to its time are given. So it does not matter where a record is cut into pieces.
+that all edges up to its time are given. So a record may be cut into pieces between any two edges.
 """
 
 from typing import Any

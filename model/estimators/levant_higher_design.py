@@ -77,7 +77,7 @@ PEAKS = {
     (3, 1): (0.05, 0.475, 1.44, 2.14, 1.46),
 }
 """The peaks of |w|, |z0 - f|, |z1| and so on by order and filtering, with L = 1. The velocity switches between 1/2 and
--1/2 any number of times, at any times. A random search found 0.93 to 0.96 of each figure."""
+-1/2 any number of times, at any times: a little more than a random search finds."""
 NOISE = 4.0
 """What an error of a count makes beside a motion, at most, in its scale: counts for z0, T**-n for z_n, T for w."""
 MEAN_ERROR = {(2, 0): 0.5, (3, 0): 1.1, (2, 1): 0.55, (3, 1): 2.1}

@@ -18,16 +18,7 @@ from hardwall.model.axis.axis import Axis
 from hardwall.model.encoder.quadrature import seen_count
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.levant_higher import Filtering2, Filtering3, Order2, Order3
-from hardwall.model.estimators.levant_higher_design import (
-    LAMBDA,
-    LARGEST_L,
-    MEAN_ERROR,
-    PEAKS,
-    Design,
-    State,
-)
-from hardwall.model.records import velocity
-from hardwall.model.runtime.compiled import compiled
+from hardwall.model.estimators.levant_higher_design import LAMBDA, Design, State
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
 from hardwall.testing.estimators import follow, model
@@ -247,83 +238,6 @@ def test_no_stop_start_or_reversal_of_the_axis_saturates(name, axis):
             assert abs(end - speeds[(part + 1) * hold - 1]) <= 0.02 * speed + 8 / tau
 
 
-@compiled
-def _peaks(order, filtering, gains, ways, period, steps, peaks):
-    """Raise the peaks of |w|, |z0 - f|, |z1|, ... to those of a velocity of 1/2 in each of these ways for a period."""
-    n, s, d, f = order + filtering, np.zeros(5), np.zeros(5), 0.0
-    for k in range(len(ways) * steps):
-        f += 0.5 * ways[k // steps] * period / steps
-        error = s[0] if filtering else s[0] - f
-        away, root = -float(np.sign(error)), abs(error) ** (1 / (n + 1))
-        for j in range(n + 1):
-            d[j] = (
-                away * gains[n - j] * root ** (n - j)
-                + (s[j + 1] if j < n else 0.0)
-                - (f if j == filtering - 1 else 0.0)
-            )
-        for j in range(n + 1):
-            s[j] += d[j] * period / steps
-        for j in range(n + 1):
-            peaks[j + 1 - filtering] = max(peaks[j + 1 - filtering], abs(s[j] - (f if j == filtering else 0.0)))
-
-
-@every
-def test_the_peaks_are_those_of_the_differential_equation(name):
-    """By Euler's method in small steps, over half periods and random reversals: the figures hold, none too large."""
-    d, random = design(name), np.random.default_rng(7)
-    found = np.zeros(d.order + 2)
-    gains = np.array([*LAMBDA[d.degree - 1]])
-    for half_period in np.geomspace(0.05, 8, 60):
-        ways = 1.0 - 2.0 * (np.arange(14) % 2)
-        _peaks(d.order, d.filtering, gains, ways, half_period, math.ceil(half_period / 1e-3), found)
-    for _ in range(2000):
-        period = 10 ** random.uniform(-1, 0.5)
-        ways = np.where(random.random(40) < 0.5, -1.0, 1.0)
-        _peaks(d.order, d.filtering, gains, ways, period, math.ceil(period / 2e-3), found)
-    for peak, figure in zip(found, PEAKS[d.order, d.filtering], strict=True):
-        assert 0.9 * figure <= peak <= figure
-
-
-@compiled
-def _mean(order, filtering, gains, moved, period, phase, settle, samples):
-    """Return how far the mean of z1 is from a steady speed of `moved` counts in `period` samples, by the equation."""
-    n, s, d, total = order + filtering, np.zeros(5), np.zeros(5), 0.0
-    speed = moved / period
-    s[filtering + 1] = speed
-    for k in range(settle + samples):
-        f = math.floor(moved * k / period + phase)
-        error = s[0] if filtering else s[0] - f
-        away, root = -float(np.sign(error)), abs(error) ** (1 / (n + 1))
-        for j in range(n + 1):
-            d[j] = (
-                away * gains[n - j] * root ** (n - j)
-                + (s[j + 1] if j < n else 0.0)
-                + (s[j + 2] / 2 if filtering <= j <= n - 2 else 0.0)
-                - (f if j == filtering - 1 else 0.0)
-            )
-        for j in range(n + 1):
-            s[j] += d[j]
-        total += s[filtering + 1] - speed if k >= settle else 0.0
-    return total / samples
-
-
-@every
-def test_the_mean_where_counts_lock_is_as_near_as_its_figure(name):
-    """Over patterns of up to 12 samples, three phases, and the largest L and less: none is more, and some are close."""
-    d, worst = design(name), 0.0
-    n = d.degree - 1
-    for own in np.geomspace(LARGEST_L ** (-1 / (d.order + 1)), 60, 40)[[*range(12), 20, 30, 39]]:
-        gains = np.array([LAMBDA[n][j] * own ** (-(d.order + 1) * (n + 1 - j) / (n + 1)) for j in range(n + 1)])
-        for period, moved in ((q, p) for q in range(1, 13) for p in range(q) if math.gcd(p, q) == 1):
-            samples = 4 * period * max(1, int(200 * own / period))
-            for phase in (0.0, 0.01 / period, 0.5 / period):
-                settle = int(60 * own) // period * period
-                found = _mean(d.order, d.filtering, gains, moved, period, phase, settle, samples)
-                worst = max(worst, abs(found) * own)
-    figure = MEAN_ERROR[d.order, d.filtering]
-    assert 0.9 * figure <= worst <= figure
-
-
 @every
 def test_a_saturation_is_left_again(name):
     """A jump by half of the count's range, which no motion makes: flagged, and forgotten."""
@@ -351,24 +265,6 @@ def test_word_length_and_rough_powers_cost_a_hundredth(name, rate):
             squares[way] += (error[int(0.4 * rate) :] ** 2).sum()
     exact, fixed = np.sqrt(squares)
     assert abs(fixed - exact) <= 0.01 * exact
-
-
-@every
-def test_a_bound_beyond_the_steps_is_refused_and_no_word_leads_there(name):
-    of = limited(name)
-    d, gains = of.design.estimator, of.design.gains
-    (word,), ((field, most),) = d.words, vars(gains).items()
-    assert (d.lipschitz, word.high) == (LARGEST_L, 0)
-    with pytest.raises(ValueError, match=rf"^{field} must be .* to {most:g} at these rates, not "):
-        assert replace(of, gains=type(gains)(1.01 * most)).design
-
-
-def test_a_speed_that_no_bound_fits_is_refused():
-    counts = np.cumsum(np.random.default_rng(1).integers(9_000_000, 15_000_000, 20))
-    with pytest.raises(
-        ValueError, match="estimator levant-2-filtering has no words for the largest speed at this rate"
-    ):
-        velocity(counts, 1.0, "levant-2-filtering", count=1e-6, acceleration_max=1.0)
 
 
 @every

@@ -140,6 +140,23 @@ def test_a_standstill_goes_on_until_it_is_said():
     assert 0 < whole[-2] < whole[300] < whole[278]
 
 
+@pytest.mark.parametrize("behind", [1, 2, 3])
+def test_an_edge_just_after_the_end_of_a_piece_counts_for_the_next_sample(behind):
+    """Far from 0 its time is not sure: the whole record would count it for the sample that was returned already."""
+    start, counts = 1.7e9, np.arange(200)
+    end = start + 100 / RATE
+    times = start + np.concatenate([np.arange(99) * 0.97e-3, 0.1 + np.arange(101) * 0.97e-3])
+    times[99] = end + behind * np.spacing(start)
+    made = EdgeVelocityEstimator(RATE, "kalman", MOTION, clock_hz=CLOCK_HZ)
+    pieces = [made(times[:99], counts[:99], until_s=end), made(times[99:], counts[99:])]
+    assert len(pieces[0]) == 100
+    moved = np.where(np.arange(200) == 99, end + 10 * np.spacing(start), times)
+    whole = EdgeVelocityEstimator(RATE, "kalman", MOTION, clock_hz=CLOCK_HZ)(moved, counts)
+    assert np.concatenate(pieces).tolist() == whole.tolist()
+    unmoved = EdgeVelocityEstimator(RATE, "kalman", MOTION, clock_hz=CLOCK_HZ)(times, counts)
+    assert (unmoved.tolist() == whole.tolist()) == (behind > 2)
+
+
 def test_words_change_from_the_next_velocity_on():
     """As if a host wrote them between two samples of the axis."""
     clocks, counts = walk(400)
