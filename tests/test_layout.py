@@ -371,17 +371,25 @@ def test_what_is_imported_is_what_its_extra_installs(path):
     assert {name for name in foreign if not installed & {plain(each) for each in PROVIDERS.get(name, [])}} == set()
 
 
+def _committed():
+    """Yield every file of the checkout, also a new one that is not ignored, with its text."""
+    listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    done = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=False)
+    if done.returncode:
+        pytest.skip("not a git checkout: nothing says here what is committed")
+    for name in filter(None, done.stdout.split("\0")):
+        if (ROOT / name).is_file():
+            yield name, (ROOT / name).read_bytes().decode("utf-8", "replace")
+
+
 def test_nothing_committed_is_of_one_machine():
     # The pattern is written so that this file does not match it.
     barred = re.compile(
         r"(?<![\w.$])/(?:work|root|home|Users)/\w|[-_]index[-_]ur[l]|find[-_]link[s]|pypi\.or[g]|pythonhoste[d]", re.I
     )
-    listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
-    done = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=False)
-    if done.returncode:
-        pytest.skip("not a git checkout: nothing says here what is committed")
-    found = []
-    for name in filter(None, done.stdout.split("\0")):
-        text = (ROOT / name).read_bytes().decode("utf-8", "replace") if (ROOT / name).is_file() else ""
-        found += [f"{name}: {match[0]}" for match in barred.finditer(text)]
-    assert found == []
+    assert [f"{name}: {match[0]}" for name, text in _committed() for match in barred.finditer(text)] == []
+
+
+def test_nothing_committed_is_half_merged():
+    marks = re.compile(r"^(<{7} |={7}$|>{7} )", re.M)
+    assert [f"{name}: {match[0]}" for name, text in _committed() for match in marks.finditer(text)] == []
