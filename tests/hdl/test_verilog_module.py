@@ -47,10 +47,12 @@ def test_a_module_is_held_to_its_model_with_what_it_includes(outside):
 @pytest.mark.parametrize(
     ("file", "old", "where"), [("mean4.v", "<= strobe;", "added/mean4.v:17"), ("rounding.vh", "VALUE) >>>", "added/")]
 )
-def test_the_log_names_an_error_by_file_and_line(outside, file, old, where):
-    assert tried(outside, file, old, "<= ;")[0] == 1
+def test_a_failed_build_names_its_first_error_by_file_and_line(outside, file, old, where):
+    code, said = tried(outside, file, old, "<= ;")
     (log,) = outside.glob("build/cocotb/test_mean4-*/build.log")
     assert log.read_text().startswith(f"%Error: {where}")
+    assert (code, f"BuildError: test_mean4 could not be built: %Error: {where}" in said) == (1, True), said
+    assert f"; see {log}" in said
 
 
 class Around(wiring.Component):
