@@ -34,7 +34,7 @@ def handle() -> list[int]:
 
 
 async def turned(dut):
-    """Turn the encoder from the first clock without a reset on."""
+    """Turn the encoder, beginning with the first clock without a reset."""
     for position in handle():
         for _ in range(CLOCKS_AN_EDGE):
             await FallingEdge(dut.clk)
