@@ -31,7 +31,7 @@ def command(
     ],
     column: Annotated[
         str | None,
-        typer.Option(help="column of counts, by name or number", show_default="none: the file is a capture of edges"),
+        typer.Option(help="column of counts, by name or number", show_default="the only one; else a capture of edges"),
     ] = None,
     coarsen: Annotated[
         int,

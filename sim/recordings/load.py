@@ -35,7 +35,7 @@ def load(
 
     Args:
         path: the file.
-        column: name or number of the column of counts; None for a capture of edges.
+        column: name or number of the column of counts; None for the only one beside the times, or a capture of edges.
         rate_hz: sample rate, required of a capture and of a file without times; if a file has times, the two must
             agree.
         reading: what else a user says of the file.
@@ -50,6 +50,7 @@ def load(
         raise RecordingError(f"{name}: the rate must be {RATE_MIN_HZ:g} to {RATE_MAX_HZ:g} Hz, not {shown(rate_hz)}")
     source = source_of(name, path, progress)
     if isinstance(source, Table):
+        column = _only(source, reading) if column is None else column
         if column is not None:
             return _Counted(source, str(path), column, rate_hz, reading).recording()
         source = LogicTable(source, reading)
@@ -59,6 +60,21 @@ def load(
         reading.refuse(name, "is a capture with times of its own", "time", "time_unit")
     reading.refuse(name, "is a capture of edges", "unit", "count", "counter_bits", "counter_modulus", "gaps")
     return recording_of(source, str(path), reading.channels, rate_hz)
+
+
+def _only(table: Table, reading: Reading) -> str | None:
+    """Return the only column of a table beside its times, which can be no capture; None if there are more.
+
+    Raises:
+        RecordingError: if there is none.
+    """
+    if reading.channels:
+        return None
+    time = time_column_of(table, reading, set())
+    places = [place for place in range(table.width) if time is None or place != time.place]
+    if not places:
+        raise RecordingError(f"{table.name}: must have a column of counts beside its times")
+    return table.called(places[0]) if len(places) == 1 else None
 
 
 class _Counted:

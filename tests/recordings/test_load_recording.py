@@ -10,7 +10,7 @@ from hardwall.sim.recordings import load as load_module
 from hardwall.sim.recordings import text
 from hardwall.sim.recordings.error import RecordingError
 from hardwall.sim.recordings.load import load
-from hardwall.sim.recordings.recording import EdgeRecord, Recording
+from hardwall.sim.recordings.recording import EdgeRecord, Reading, Recording
 
 GOOD = ["0.000,5", "0.001,6", "0.002,4", "0.003,4"]
 
@@ -29,6 +29,31 @@ def test_other_columns_may_hold_anything(read):
     assert recording.counts.tolist() == [5, 6, -4]
     assert recording.start_s == 1.5
     assert recording.rate_hz == 10.0
+
+
+@pytest.mark.parametrize(
+    ("content", "rate_hz", "column"),
+    [("5\n6\n4\n", 10, "1"), ("angle\n5\n6\n4\n", 10, "angle"), ("x,time_ms\n5,0\n6,100\n4,200\n", None, "x")],
+    ids=["no names", "one name", "beside the times"],
+)
+def test_the_only_column_has_the_counts(tmp_path, content, rate_hz, column):
+    path = tmp_path / "spindle.csv"
+    path.write_text(content)
+    found = load(path, rate_hz=rate_hz)
+    assert (found.counts.tolist(), found.rate_hz, found.column) == ([5, 6, 4], 10.0, column)
+    with pytest.raises(RecordingError, match="a capture"):
+        load(path, reading=Reading(channels=("1", "1")))
+
+
+@pytest.mark.parametrize("columns", [1, 2])
+def test_other_columns_without_a_name_given_are_channels(tmp_path, columns):
+    path = tmp_path / "spindle.csv"
+    path.write_text(
+        "time_s" + ",x,y" * (columns - 1) + "\n" + "".join(f"{k}{',1,0' * (columns - 1)}\n" for k in range(3))
+    )
+    said = "must have a column of counts beside its times" if columns == 1 else "is a capture of edges"
+    with pytest.raises(RecordingError, match=said):
+        load(path)
 
 
 @pytest.mark.parametrize(
