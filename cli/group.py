@@ -35,6 +35,8 @@ COMMANDS = {
     "board": "Build a bitstream and the wiring instructions for a board from a scene; --program loads the bitstream.",
     "synth": "Synthesise a scene's axis, supervisor and link for an FPGA: its logic cells and highest clock rate.",
     "accuracy": "Measure the error of velocity estimators at every sample rate, on known motions or on recordings.",
+    "rivals": "Compare velocity estimators of other projects with this project's: dVRK's, LinuxCNC's, ODrive's and "
+    "others, on known motions or on recordings.",
     "costs": "Count the logic cells of each estimator on an FPGA, and the highest clock rate of a board with it "
     "(a minute or two each).",
     "axes": "Count the logic cells of 1 to 32 axes in one pipeline on an ECP5, and give their highest sample rate "

@@ -1,0 +1,3 @@
+from ....model.runtime.extras import need
+
+need("sim")
