@@ -25,7 +25,8 @@ FILTER_S = 5e-3
 LOOP_S = 1e-3
 """The time of a turn of the main loop; also what the source assumes for a first reading, which has no turn before."""
 SILENT_S = 0.1
-APART_S = 100e-6
+APART_US = 100
+"""The least time of a difference, in the whole microseconds that the source counts."""
 
 
 class Mixed(NamedTuple):
@@ -115,7 +116,7 @@ def _edge_differences(rival, state, time_s, number):
 @compiled
 def _read_differences(rival, state, time_s):
     last_number, last_s, velocity = state.last_number, state.last_s, state.velocity
-    if time_s - last_s >= APART_S and state.number != last_number:
+    if round((time_s - last_s) * 1e6) >= APART_US and state.number != last_number:
         velocity = (state.number - last_number) / (time_s - last_s)
         last_number, last_s = state.number, time_s
     filtered = _smooth(state.filtered, velocity, rival.filter_s, _period_s(time_s, state.read_s))

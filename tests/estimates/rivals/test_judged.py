@@ -5,12 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hardwall.sim.estimates import signals
 from hardwall.sim.estimates.accuracy import COARSEN
 from hardwall.sim.estimates.accuracy import measure as measure_own
+from hardwall.sim.estimates.motions import encoded
 from hardwall.sim.estimates.replay import replay
+from hardwall.sim.estimates.rivals.dvrk import ACCELERATION, Dvrk
 from hardwall.sim.estimates.rivals.judged import measure, measure_acceleration, measure_recording, spread
 from hardwall.sim.estimates.rivals.known import LOOP, choices
+from hardwall.sim.estimates.rivals.rival import estimates, seen_of
 from hardwall.sim.recordings.recording import EdgeRecord
+from hardwall.sim.world.encoder import Encoder
 from stimuli.replays import reference_of, swing
 
 RATE = 10_000
@@ -27,10 +32,14 @@ def test_a_steady_speed_has_no_error_but_the_stamps():
 def test_an_error_of_phase_shows_where_edges_are_single_and_not_over_a_cycle():
     encoder = {"encoder.phase_error_counts": 0.25}
     cycle, single = (
-        measure(name, {"period_s": 0.0}, "steady:20.03", RATE, encoder) for name in ("dvrk-measured", "hostmot2")
+        measure(name, {"period_s": 0.0}, "steady:5.03", 100_000, encoder) for name in ("dvrk-measured", "hostmot2")
     )
-    assert single["rms_mm_s"] > 1
-    assert cycle["rms_mm_s"] < 0.01
+    # The times are 1.25 and 0.75 counts long in turn. The speed of the short one holds in the long one, until the time
+    # since the edge bounds it; the speed of the long one holds in the short one.
+    bounded = (1.25 - 1 / 1.25 - 2 * np.log(1.25)) - (0.75 - 1 / 0.75 - 2 * np.log(0.75))
+    mean = (0.75 * (1 / 0.75 - 1) ** 2 + bounded + 0.75 * (1 / 1.25 - 1) ** 2) / 2
+    assert single["rms_mm_s"] == pytest.approx(5.03 * np.sqrt(mean), rel=0.01)
+    assert cycle["rms_mm_s"] < 0.001
 
 
 def test_a_calibrated_pico_knows_the_encoder_that_it_sees():
@@ -38,24 +47,29 @@ def test_a_calibrated_pico_knows_the_encoder_that_it_sees():
     known, unknown = (
         measure("pico", {"period_s": 3e-4, "calibrated": each}, "steady:20.03", RATE, encoder) for each in (True, False)
     )
-    assert known["rms_mm_s"] < 0.01 < 0.3 < unknown["rms_mm_s"]
+    assert known["rms_mm_s"] < 0.01
+    assert unknown["rms_mm_s"] > 0.1
 
 
 def test_a_sensor_is_late_by_its_filter():
     settings = {"period_s": 1e-3, "filter_s": 5e-3}
-    row = measure("simplefoc-sensor", settings, "sweep", RATE, None)
+    row = measure("simplefoc-sensor", settings, "paper", RATE, None)
     # The filter, and half of the period over which a difference is, and half of the time that it is held.
-    assert row["delay_s"] == pytest.approx(6e-3, abs=1.5e-3)
+    assert row["delay_s"] == pytest.approx(6e-3, abs=0.2e-3)
 
 
 def test_the_acceleration_of_the_papers_signal():
-    """Its RMS from 1 s to 5 s is an integral, here by the trapezoidal rule; no estimate has this error."""
-    times_s = np.linspace(1, 5, 400_001)
+    """The true one is the second derivative of the signal's formula."""
+    times_s = np.arange(5 * RATE) / RATE
     p = complex(-1.0, 2 * np.pi)
     exact = (50e-3 * p**2 * np.exp(p * times_s)).imag
+    signal, estimate = signals.load("paper"), np.zeros(5 * RATE)
+    found = encoded(signal.motion, Encoder(1e-6, 50e6), 5.0, 1e-3, 0)
+    estimates(Dvrk(ACCELERATION), seen_of(found, 50e6), float(RATE), 1, estimate)
     row = measure_acceleration("dvrk", "paper", RATE, None)
-    assert row["signal_rms_mm_s2"] == pytest.approx(1e3 * np.sqrt(np.mean(exact**2)), rel=1e-3)
-    assert 0 < row["rms_mm_s2"] < row["signal_rms_mm_s2"]
+    assert row["signal_rms_mm_s2"] == pytest.approx(1e3 * np.sqrt(np.mean(exact[RATE:] ** 2)), rel=1e-6)
+    error = (1e-6 * estimate - exact)[RATE:]
+    assert row["rms_mm_s2"] == pytest.approx(1e3 * np.sqrt(np.mean(error**2)), rel=1e-6)
 
 
 def test_edges_are_spread_over_their_sample():
