@@ -119,7 +119,7 @@ class Bench:
 
     def own_job(self, estimator: str, encoder: str, motion: str, gains: Settings | None = None) -> dict[str, Any]:
         """Return the arguments of `accuracy.measure`, with the bound of the impact for every motion."""
-        return self.job(encoder, motion) | {
+        return self.job(encoder, MOTIONS[motion]) | {
             "estimator": estimator,
             "output": design_of(estimator).outputs[0],
             "backend": self.backend,
@@ -131,11 +131,11 @@ class Bench:
         """Return the arguments of `judged.measure`; for the loop, which this project has, of `accuracy.measure`."""
         if name == LOOP:
             return self.own_job(LOOP, encoder, motion, settings)
-        return self.job(encoder, motion) | {"name": name, "settings": settings}
+        return self.job(encoder, MOTIONS[motion]) | {"name": name, "settings": settings}
 
-    def job(self, encoder: str, motion: str) -> dict[str, Any]:
+    def job(self, encoder: str, signal: str) -> dict[str, Any]:
         """Return the arguments that every estimator takes."""
-        return {"signal": MOTIONS[motion], "sample_hz": self.sample_hz, "encoder": self.encoders[encoder] or None}
+        return {"signal": signal, "sample_hz": self.sample_hz, "encoder": self.encoders[encoder] or None}
 
 
 def study(bench: Bench, recorded: list[Recording]) -> Rivals:
@@ -212,6 +212,6 @@ def _on_recording(recorded: Recording, backend: str) -> list[Row]:
 def _accelerations(bench: Bench) -> list[Row]:
     """Return the errors of the rivals' accelerations on the paper's signal."""
     keys = [(name, encoder) for name in ACCELERATIONS for encoder in bench.encoders]
-    jobs = [bench.job(encoder, "swing") | {"name": name} for name, encoder in keys]
+    jobs = [bench.job(encoder, "paper") | {"name": name} for name, encoder in keys]
     found = bench.run("accelerations", judged.measure_acceleration, jobs)
     return [{"estimator": name, "encoder": encoder, **row} for (name, encoder), row in zip(keys, found, strict=True)]

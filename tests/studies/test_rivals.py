@@ -118,7 +118,7 @@ def test_recordings_are_judged_by_all(monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--sample-rate", "10"], "--sample-rate must be a whole number of 1000 to 1e+07 Hz"),
+        (["--sample-rate", "10"], "--sample-rate must be whole numbers of 1000 to 1e+07 Hz"),
         (["--signal", "paper"], "--signal must be FILE:COLUMN, or FILE, with a suffix such as .csv, not 'paper'"),
         (["--rate", "1000"], "--rate must be absent without a recording"),
         (["--set", "handle.mass_kg=1"], "--set must be of an error of the encoder, encoder.KEY=VALUE"),
