@@ -6,7 +6,6 @@ from typing import Annotated
 import typer
 
 from ..sim.estimates.accuracy import errors_of
-from ..sim.estimates.replay_plan import ReplayError
 from ..sim.jobs.store import Store
 from ..sim.studies import rivals
 from .accuracy import FILE
@@ -43,7 +42,7 @@ def command(
         readings = [options.read(match["file"], match["column"]) for match in matches.values() if match]
         run = partial(options.results, store=Store("rivals"))
         result = rivals.study(rivals.Bench(sample_hz, backend, encoders, run), readings)
-    except (ValueError, ReplayError) as error:
+    except ValueError as error:
         raise BadInput(str(error)) from None
     for each in readings:
         say(each)

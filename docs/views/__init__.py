@@ -6,7 +6,7 @@ import reports
 
 from support.reports import check
 
-from . import accuracy, hardware, rendered, trade, walls
+from . import accuracy, hardware, rendered, rivals, trade, walls
 
 
 class UnknownError(Exception):
@@ -35,6 +35,10 @@ VIEWS: dict[str, Callable[..., list[str]]] = {
     "bandwidth": rendered.bandwidth,
     "every-output": rendered.every_output,
     "contact": rendered.contact,
+    "rivals-perfect": rivals.perfect,
+    "rivals-real": rivals.real,
+    "rivals-settings": rivals.settings,
+    "rivals-accelerations": rivals.accelerations,
     "parts": trade.parts,
     "shortcuts": trade.shortcuts,
     "speed": trade.speed,

@@ -1,6 +1,6 @@
 """dVRK, the da Vinci Research Kit: the time of the last full cycle, and a prediction from two cycles.
 
-Its FPGA keeps the times q1 to q5 of the last five quarter cycles, q1 the newest, each with its direction and its kind
+Its FPGA keeps the times q1 to q5 of the last five quarter cycles; q1 is the newest. Each has its direction and its kind
 of edge. In counts and seconds, with r the time since the last edge and d the direction:
 
     P        = q1 + q2 + q3 + q4            the time between two edges of one kind

@@ -86,7 +86,7 @@ def measure_acceleration(name: str, signal: str, sample_hz: int, encoder: dict[s
 
 
 def spread(counts: np.ndarray, rate_hz: float) -> Seen:
-    """Return the edges of sampled counts, those of each sample evenly apart; the first count is the start."""
+    """Return the edges of sampled counts, evenly over each sample; the first count is the start."""
     changes = np.diff(counts)
     many = np.abs(changes)
     sample = np.repeat(np.arange(len(changes)), many)

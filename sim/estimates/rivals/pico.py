@@ -6,11 +6,11 @@ the scale, which a calibration can give for each of the four kinds. In counts an
     cell changed:  v = (x - x') / (t - t')     x', t' of the last edge of the last reading with a change
     then:          v is held within the speeds that lead from x at t to the ends of the cell now
 
-If the edge is nearer to now than to the last reading, the bounds are the speeds from the ends of the cell at the last
-reading to x at t.
+If the edge is nearer to now than to the last reading, the other side bounds v: by the speeds that lead to x at t from
+the ends of the cell at the last reading.
 
-At rest the bounds bring v towards 0. v is 0 from the third reading without a change on (`IDLE_READINGS`), and until the
-second change after that; the bounds may give a speed before.
+At rest the bounds bring v towards 0. From the third reading without a change on (`IDLE_READINGS`) v is 0. After that
+the first change gives no time between edges: v is then 0, or what the bounds allow next to 0.
 
 It uses the cell and the stamp of the last edge. Usual: 100 readings a second, and places without calibration.
 

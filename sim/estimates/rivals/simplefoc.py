@@ -5,8 +5,8 @@
     v = (N - N') / (t - t')    if N changed and t - t' is more than half the period; else v is kept
     v = 0                      from 0.1 s without an edge on
 
-Here N' and t' are of the reading before. `Sensor` has no stamps: v is the change of the count over the time since its
-last change, at most every 100 us, and is kept while the count stays. So at rest `Sensor` keeps its last speed for ever.
+Here N' and t' are of the reading before. `Sensor` has no stamps. Its v is the change of the count over the time since
+the last change, at most every 100 us. While the count stays, v stays: at rest `Sensor` keeps its last speed for ever.
 
 The low pass: y <- a y + (1 - a) v, with a = T / (T + period).
 
