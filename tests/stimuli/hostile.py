@@ -55,6 +55,8 @@ GOOD: dict[str, tuple[str, ...]] = {
     "rates": ("1e3", "1e3,2e3", "10000"),
     "tried": ("1e3,1e4", "10000"),
     "rate": ("1000", "1e4"),
+    "sample_rate": ("1000", "1e4"),
+    "recordings": ("recording.csv:counts", "recording.csv"),
     "signal": ("paper", "stop", "flicker", "steady:5", "recording.csv:counts"),
     "column": ("counts", "time_s"),
     "time": ("time_s", "none"),
