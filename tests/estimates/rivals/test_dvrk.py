@@ -57,6 +57,17 @@ def test_the_prediction_has_a_limit_and_keeps_its_sign(way):
     assert predicted == 0
 
 
+def test_the_prediction_reaches_from_the_middle_of_the_cycle_to_now():
+    # Quarters of 20, 18, 16, 15 and 14 ms: cycles of 69 and of 63 ms.
+    ends_ms = (20, 40, 58, 74, 89, 103)
+    edges = [(at / 1000, START + 1 + k) for k, at in enumerate(ends_ms)]
+    newest, before = Fraction(4000, 63), Fraction(4000, 69)
+    acceleration = (newest - before) / (Fraction(20 + 14, 1000) / 2)
+    for since_ms in (0, 5, 10):
+        expected = newest + acceleration * (Fraction(63, 2000) + Fraction(since_ms, 1000))
+        assert outputs(edges, (103 + since_ms) / 1000)[1] == pytest.approx(float(expected))
+
+
 def test_at_rest_the_measured_speed_stays_and_the_predicted_one_falls_to_the_end_of_its_counter():
     edges = steady(START, 100, 1, 12)
     measured, predicted, _ = outputs(edges, edges[-1][0] + 1000.0)
