@@ -90,12 +90,19 @@ def _friction(report: Report) -> str:
 
 
 def jerks(*reports: Report) -> list[str]:
-    """Return the area of every method, a row for the bound on the jerk of each report."""
-    key = "controller.jerk_max_m_per_s3"
-    rows = [
-        [number(report["maps"][0]["changes"][key], 1), *(_area(each) for each in report["maps"])] for report in reports
+    """Return the area of every method, a row for the bound on the jerk of each report.
+
+    Methods that have no such bound come first, in a table of their own.
+    """
+    bounds = [number(report["maps"][0]["changes"]["controller.jerk_max_m_per_s3"], 1) for report in reports]
+    areas = {each[0]["label"]: [_area(one) for one in each] for each in zip(*(r["maps"] for r in reports), strict=True)}
+    without = {label: found[0] for label, found in areas.items() if len(set(found)) == 1}
+    told = {label: found for label, found in areas.items() if label not in without}
+    return [
+        *table(["without a bound on the jerk", AREA], without.items()),
+        "",
+        *table([f"jerk (m/s³); {AREA}", *told], zip(bounds, *told.values(), strict=True)),
     ]
-    return table([f"jerk (m/s³); {AREA}", *(each["label"] for each in reports[0]["maps"])], rows)
 
 
 def hands(report: Report) -> list[str]:
