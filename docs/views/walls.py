@@ -90,19 +90,22 @@ def _friction(report: Report) -> str:
 
 
 def jerks(*reports: Report) -> list[str]:
-    """Return the area of every method, a row for the bound on the jerk of each report.
-
-    Methods that have no such bound come first, in a table of their own.
-    """
+    """Return the area of every method that has a bound on the jerk, a row for the bound of each report."""
     bounds = [number(report["maps"][0]["changes"]["controller.jerk_max_m_per_s3"], 1) for report in reports]
-    areas = {each[0]["label"]: [_area(one) for one in each] for each in zip(*(r["maps"] for r in reports), strict=True)}
-    without = {label: found[0] for label, found in areas.items() if len(set(found)) == 1}
-    told = {label: found for label, found in areas.items() if label not in without}
-    return [
-        *table(["without a bound on the jerk", AREA], without.items()),
-        "",
-        *table([f"jerk (m/s³); {AREA}", *told], zip(bounds, *told.values(), strict=True)),
-    ]
+    told = {label: found for label, found in _areas(*reports).items() if len(set(found)) > 1}
+    return table([f"jerk (m/s³); {AREA}", *told], zip(bounds, *told.values(), strict=True))
+
+
+def without_jerk(*reports: Report) -> list[str]:
+    """Return the area of every method that has the same in all reports, whatever their bounds on the jerk."""
+    return table(
+        ["method", AREA], ([label, one] for label, (one, *more) in _areas(*reports).items() if {one} >= {*more})
+    )
+
+
+def _areas(*reports: Report) -> dict[str, list[str]]:
+    """Return the areas of every method, in the order of the reports."""
+    return {of[0]["label"]: [*map(_area, of)] for of in zip(*(each["maps"] for each in reports), strict=True)}
 
 
 def hands(report: Report) -> list[str]:
