@@ -21,6 +21,7 @@ VIEWS: dict[str, Callable[..., list[str]]] = {
     "frontier": accuracy.frontier,
     "by-rate": accuracy.by_rate,
     "jerks": walls.jerks,
+    "without-jerk": walls.without_jerk,
     "regions": walls.maps,
     "facts": walls.facts,
     "devices": walls.devices,

@@ -90,12 +90,22 @@ def _friction(report: Report) -> str:
 
 
 def jerks(*reports: Report) -> list[str]:
-    """Return the area of every method, a row for the bound on the jerk of each report."""
-    key = "controller.jerk_max_m_per_s3"
-    rows = [
-        [number(report["maps"][0]["changes"][key], 1), *(_area(each) for each in report["maps"])] for report in reports
-    ]
-    return table([f"jerk (m/s³); {AREA}", *(each["label"] for each in reports[0]["maps"])], rows)
+    """Return the area of every method that has a bound on the jerk, a row for the bound of each report."""
+    bounds = [number(report["maps"][0]["changes"]["controller.jerk_max_m_per_s3"], 1) for report in reports]
+    told = {label: found for label, found in _areas(*reports).items() if len(set(found)) > 1}
+    return table([f"jerk (m/s³); {AREA}", *told], zip(bounds, *told.values(), strict=True))
+
+
+def without_jerk(*reports: Report) -> list[str]:
+    """Return the area of every method that has the same in all reports, whatever their bounds on the jerk."""
+    return table(
+        ["method", AREA], ([label, one] for label, (one, *more) in _areas(*reports).items() if {one} >= {*more})
+    )
+
+
+def _areas(*reports: Report) -> dict[str, list[str]]:
+    """Return the areas of every method, in the order of the reports."""
+    return {of[0]["label"]: [*map(_area, of)] for of in zip(*(each["maps"] for each in reports), strict=True)}
 
 
 def hands(report: Report) -> list[str]:

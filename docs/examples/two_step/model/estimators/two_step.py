@@ -7,9 +7,8 @@ Formats, derived. The velocity has one fraction bit, so that half a count a samp
 range is twice the axis's largest speed, like the range of the finite difference.
 
 Ends. Every difference is taken modulo the count's width, so the count may wrap; their sum is one bit wider, so it does
-not wrap. A step, or a speed, of more than twice the largest speed saturates, with the flag `velocity_saturated`. The
-first sample, and every sample with `restart`, reads 0, and the sample after it has only one difference, which counts
-half. Standstill reads 0.
+not wrap. A velocity beyond the range saturates, with the flag `velocity_saturated`. The first sample, and every sample
+with `restart`, reads 0, and the sample after it has only one difference, which counts half. Standstill reads 0.
 
 Source: elementary.
 """
