@@ -74,6 +74,10 @@ class Rivals:
         named = ("estimator", "settings", "recording")
         return tables + ([table_of(named, ("RMS (counts/s)", "largest"), lines)] if recorded else [])
 
+    @property
+    def _recorded(self) -> bool:
+        return any("rms_counts_s" in row for row in self.rows)
+
     def notes(self) -> list[str]:
         """Return the meaning of the settings, and the errors of the encoders."""
         return [
@@ -81,6 +85,7 @@ class Rivals:
             f"{OWN}: the gains of this project, one set for all motions",
             "swing: the paper's signal; impact: a hit of a wall; dither: 0.3 um about an edge; creep: 1.037 mm/s",
             *(f"{name} encoder: {said_of(errors)}" for name, errors in self.encoders.items() if errors),
+            *["recordings: the gains of this project follow from each recording's own acceleration"] * self._recorded,
         ]
 
 
