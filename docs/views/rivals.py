@@ -65,18 +65,18 @@ def real(report: Report) -> list[str]:
 def settings(report: Report) -> list[str]:
     """Return the usual settings of the rivals, and the best ones on swing and impact, with each encoder."""
     usual = {row["estimator"]: row["settings"] for row in report["rows"] if row["setting"] == "usual"}
-    places = [(encoder, motion) for encoder in report["encoders"] for motion in ("swing", "impact")]
     best = {
-        (row["estimator"], row["encoder"], row["motion"]): row["settings"]
+        (row["estimator"], row["motion"], row["encoder"]): row["settings"]
         for row in report["rows"]
         if row["setting"] == "best" and "encoder" in row
     }
+    names = [(name, motion) for name in usual for motion in ("swing", "impact")]
     rows = [
-        [f"`{name}`", _said(own), *(_said(best[name, *place]) for place in places)]
-        for name, own in usual.items()
-        if (name, *places[0]) in best
+        [f"`{name}`, {motion}", _said(usual[name]), *(_said(best[name, motion, each]) for each in report["encoders"])]
+        for name, motion in names
+        if (name, motion, "real") in best
     ]
-    return table(["settings", "usual", *(f"best: {motion}, {encoder}" for encoder, motion in places)], rows)
+    return table(["settings", "usual", *(f"best, {encoder} encoder" for encoder in report["encoders"])], rows)
 
 
 def _said(chosen: dict[str, Any]) -> str:
