@@ -50,7 +50,7 @@ def draw(trade: Trade) -> Figure:
     axes.set_yticks(range(len(rows)), [point.shortcut.label for point in rows])
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.grid(visible=False, axis="y")
-    axes.set_xlabel("area of the stable walls; 1 is the area with all parts")
+    axes.set_xlabel("area of the stable walls (1: the area with all parts)")
     for text, color in zip(_names(axes), [ink(curve.estimator) for curve in curves], strict=True):
         text.set_color(color)
     notes = (

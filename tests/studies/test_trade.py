@@ -243,7 +243,7 @@ def test_the_command_prints_and_draws_real_hits(monkeypatch, capsys, tmp_path):
     assert all(row["hit_s"] > 0 and row["map_hits"] > 0 for row in report["settings"])
     assert any(row["best_for"] for row in report["settings"])
     text = picture.read_text()
-    wanted = "area of the stable walls, of that with all parts (ratio)", "FDM + 500 Hz"
+    wanted = "area of the stable walls (1: the area with all parts)", "FDM + 500 Hz"
     assert [label for label in wanted if label not in text] == []
     # Only what moves an edge is drawn.
     assert any(each.label in text for each in kept[1:])
