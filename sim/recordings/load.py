@@ -18,7 +18,7 @@ from .recording import RATE_MAX_HZ, RATE_MIN_HZ, SAMPLES_MAX, Reading, Recording
 from .stamps import UNITS, Stamps, Times
 from .steps import Steps, Unwrapped
 from .table import Table
-from .time_column import TIME_COLUMN, TimeColumn, place_of, time_column_of, unit_by_rate
+from .time_column import TIME_COLUMN, TimeColumn, place_of, time_column_of, unit_by_rate, unit_of
 from .times import Sampled, check_mean
 
 NOTHING_SAID = Reading()
@@ -68,13 +68,16 @@ def _only(table: Table, reading: Reading) -> str | None:
     Raises:
         RecordingError: if there is none.
     """
-    if reading.channels:
+    if reading.channels or table.rate_hz is not None:
         return None
-    time = time_column_of(table, reading, set())
-    places = [place for place in range(table.width) if time is None or place != time.place]
-    if not places:
+    times = [time_column_of(table, reading, {place}) for place in range(table.width)]
+    beside = {
+        place for place, time in enumerate(times) if table.width == 1 + (time is not None and time.place != place)
+    }
+    counts = [place for place in beside if not unit_of(table.called(place))[0]]
+    if beside and not counts:
         raise RecordingError(f"{table.name}: must have a column of counts beside its times")
-    return table.called(places[0]) if len(places) == 1 else None
+    return table.called(counts[0]) if len(counts) == 1 else None
 
 
 class _Counted:

@@ -184,6 +184,8 @@ def _row(estimator: str, setting: str, settings: Settings, figures: Row) -> Row:
 def _of_rival(bench: Bench, name: str) -> list[Row]:
     """Return the rows of a rival: with its usual settings, if the rate allows them, and with the best for a motion."""
     usual, every = choices(name, bench.sample_hz)
+    if not every:
+        return []
     keys = [(place, settings) for place in bench.places for settings in every]
     jobs = [bench.rival_job(name, *place, settings) for place, settings in keys]
     found = bench.run(name, measure if name == LOOP else judged.measure, jobs)

@@ -33,7 +33,11 @@ def test_other_columns_may_hold_anything(read):
 
 @pytest.mark.parametrize(
     ("content", "rate_hz", "column"),
-    [("5\n6\n4\n", 10, "1"), ("angle\n5\n6\n4\n", 10, "angle"), ("x,time_ms\n5,0\n6,100\n4,200\n", None, "x")],
+    [
+        ("5\n6\n4\n", 10, "1"),
+        ("angle\n5\n6\n4\n", 10, "angle"),
+        ("x,time_ms\n5,0\n6,100\n4,200\n", None, "x"),
+    ],
     ids=["no names", "one name", "beside the times"],
 )
 def test_the_only_column_has_the_counts(tmp_path, content, rate_hz, column):
@@ -43,6 +47,28 @@ def test_the_only_column_has_the_counts(tmp_path, content, rate_hz, column):
     assert (found.counts.tolist(), found.rate_hz, found.column) == ([5, 6, 4], 10.0, column)
     with pytest.raises(RecordingError, match="a capture"):
         load(path, reading=Reading(channels=("1", "1")))
+
+
+def test_the_only_column_may_have_times_of_its_own(tmp_path):
+    path = tmp_path / "spindle.csv"
+    path.write_text("x.time,x\n0,5\n0.01,6\n0.02,4\n")
+    found = load(path)
+    assert (found.counts.tolist(), found.rate_hz, found.column) == ([5, 6, 4], 100.0, "x")
+
+
+@pytest.mark.parametrize("heads", ["seconds,nanoseconds", "timestamp,time_s"])
+def test_times_are_no_counts(tmp_path, heads):
+    path = tmp_path / "spindle.csv"
+    path.write_text(f"{heads}\n1,0\n2,1000\n3,2000\n")
+    with pytest.raises(RecordingError, match="must have a column of counts beside its times"):
+        load(path)
+
+
+def test_a_file_that_states_its_sample_rate_has_channels(tmp_path):
+    path = tmp_path / "logic.csv"
+    path.write_text("; Samplerate: 1 kHz\nD0\n0\n1\n0\n1\n")
+    with pytest.raises(RecordingError, match="the channels A and B must be given"):
+        load(path, rate_hz=1e5)
 
 
 @pytest.mark.parametrize("columns", [1, 2])

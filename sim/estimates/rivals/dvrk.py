@@ -11,8 +11,9 @@ of edge. In counts and seconds, with r the time since the last edge and d the di
 A full cycle is free of the errors that repeat every four edges. The acceleration is the difference of two cycles'
 velocities over the time between their middles. It is 0 if q1 and q5 are of different edges or directions.
 
-At rest `measured` keeps its last value until the next edge. `predicted` falls as 1 / r, and so to 0.73 counts/s, where
-the counter of r ends. After a reversal both are 0 until four quarters are of one direction.
+At rest `measured` keeps its last value until the next edge. `predicted` is at most 1 / r, so at most 0.73 counts/s
+where the counter of r ends; after braking it reaches 0. After a reversal both are 0 until four quarters are of one
+direction.
 
 It uses the stamps of edges. It has no setting: counters of 26 bits at 49.152 MHz give the longest time. The host takes
 `predicted`, which the source calls the most accurate.

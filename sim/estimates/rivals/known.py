@@ -85,16 +85,23 @@ PROJECTS = {name: rival.project for name, rival in RIVALS.items()} | {LOOP: "ODr
 """The projects of all rivals, by the names of the rivals."""
 
 
+def _is_whole(samples: float) -> bool:
+    """Return whether a period is a whole number of samples; 0 stands for every sample."""
+    return samples == 0 or (samples > 0.5 and abs(samples - round(samples)) < 1e-3)
+
+
 def choices(name: str, sample_hz: float) -> tuple[Settings | None, list[Settings]]:
-    """Return the usual settings of a rival, None where the rate is too low for them, and all settings, each once.
+    """Return the usual settings of a rival, None where the rate does not suit them, and all settings, each once.
 
     Args:
         name: one of `PROJECTS`.
-        sample_hz: the sample rate, which limits the bandwidth of the loop.
+        sample_hz: the sample rate: it limits the bandwidth of the loop, and a period of reading is whole samples.
     """
     if name != LOOP:
         rival = RIVALS[name]
-        return rival.usual, [rival.usual, *(settings for settings in rival.tried if settings != rival.usual)]
+        every = [rival.usual, *(settings for settings in rival.tried if settings != rival.usual)]
+        every = [settings for settings in every if _is_whole(settings["period_s"] * sample_hz)]
+        return rival.usual if rival.usual in every else None, every
     most_hz = INDEX_MAX * sample_hz / math.tau
     every = [settings for settings in (LOOP_USUAL, *LOOP_TRIED) if settings["bandwidth_hz"] < most_hz]
     return LOOP_USUAL if LOOP_USUAL in every else None, every

@@ -45,3 +45,12 @@ def test_a_rate_limits_the_bandwidth():
     usual, every = choices(LOOP, 2100.0)
     assert usual in every
     assert choices(LOOP, 100.0) == (None, [])
+
+
+def test_a_period_of_reading_is_a_whole_number_of_samples():
+    usual, every = choices("hostmot2", 2000.0)
+    assert usual in every
+    assert {settings["period_s"] * 2000 % 1 for settings in every} == {0.0}
+    assert choices("hostmot2", 100.0) == (None, [{"period_s": 0.01}, {"period_s": 0.0}])
+    assert choices("simplefoc-encoder", 1500.0) == (None, [])
+    assert choices("dvrk", 100.0)[0] == {"period_s": 0.0}
