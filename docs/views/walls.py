@@ -98,9 +98,7 @@ def jerks(*reports: Report) -> list[str]:
 
 def without_jerk(*reports: Report) -> list[str]:
     """Return the area of every method that has the same in all reports, whatever their bounds on the jerk."""
-    return table(
-        ["method", AREA], ([label, one] for label, (one, *more) in _areas(*reports).items() if {one} >= {*more})
-    )
+    return table(["method", AREA], ([label, of[0]] for label, of in _areas(*reports).items() if len(set(of)) == 1))
 
 
 def _areas(*reports: Report) -> dict[str, list[str]]:

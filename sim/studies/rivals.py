@@ -1,8 +1,8 @@
 """Rivals on one bench: the velocity estimators of other projects beside this project's own, in one table.
 
 All see the same edges, and are judged at the same samples against the same truth. This project's estimators have one
-set of default gains for all motions, for the largest acceleration of the impact. A rival has two lines: its usual
-settings, and for each motion the best of some settings, a choice that no device has.
+set of default gains for all motions: for the largest acceleration of the impact, and for the swing's largest jerk. A
+rival has its usual settings, and for each motion the best of some settings, a choice that no device has.
 """
 
 from dataclasses import dataclass, field
@@ -82,7 +82,7 @@ class Rivals:
         """Return the meaning of the settings, and the errors of the encoders."""
         return [
             f"{USUAL}: the settings of its project; {BEST}: of the settings that were tried, the best for each motion; "
-            f"{OWN}: the gains of this project, one set for all motions",
+            f"{OWN}: the gains of this project, one set for the impact's acceleration and the swing's jerk",
             "swing: the paper's signal; impact: a hit of a wall; dither: 0.3 um about an edge; creep: 1.037 mm/s",
             *(f"{name} encoder: {said_of(errors)}" for name, errors in self.encoders.items() if errors),
             *["recordings: the gains of this project follow from each recording's own acceleration"] * self._recorded,
@@ -107,7 +107,7 @@ class Bench:
 
     Attributes:
         sample_hz: sample rate.
-        backend: backend of this project's estimators; the rivals are in float64.
+        backend: backend of this project's estimators, the loop among them; the other rivals are in float64.
         encoders: the errors of each encoder, by its name.
         run: what does the jobs.
     """

@@ -101,6 +101,13 @@ def test_a_low_rate_has_no_usual_bandwidth():
     assert [row["setting"] for row in rows] == [BEST] * len(MOTIONS)
 
 
+def test_a_rate_that_suits_no_period_leaves_a_rival_out():
+    found = study(Bench(1500, "float", {"perfect": {}}, Invented()), [])
+    left_out = {name for name in PROJECTS if not choices(name, 1500)[1]}
+    assert left_out == {"simplefoc-encoder", "simplefoc-sensor"}
+    assert {row["estimator"] for row in found.rows} == {*PROJECTS, *OURS} - left_out
+
+
 def test_recordings_are_judged_by_all(monkeypatch):
     monkeypatch.setattr(rivals, "MOTIONS", {})
     found = study(Bench(RATE, "float", {"perfect": {}}, Invented()), [swing()])
