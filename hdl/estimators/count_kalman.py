@@ -9,7 +9,7 @@ from .estimate import EstimatorBlock
 
 
 class Filter(edge_kalman.Estimator):
-    """The filter of edges without its watch over bursts, of which the edges of counts show nothing."""
+    """The filter of edges without its watch over bursts: edges that are made from counts do not show any."""
 
     def _watch(self, m, s):
         """Add nothing: there are no bursts, and no jolts."""
@@ -28,7 +28,7 @@ class Estimator(EstimatorBlock):
     Latency: `latency` clocks from `strobe` to `valid`, a clock more than the filter's; the next `strobe` may come with
     `valid`.
 
-    Rounding and overflow: those of the filter. Counts and times may wrap.
+    Rounding and overflow: as in the filter. Counts and times may wrap.
 
     Parameters
     ----------

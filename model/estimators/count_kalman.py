@@ -1,9 +1,9 @@
 """Velocity from the changes of the count: the Kalman filter of `edge_kalman`, for encoders without clock stamps.
 
-A count is a poor measurement of the position at a sample, off by up to half a count, and the error stays for as long as
-the count does. A change of the count is a better one: between the last sample and this one, the axis was at the border
-of two cells. Its error is the motion within half a sample at most, which becomes smaller with the rate. A count that
-does not change says that the axis is still within its cell, which bounds the velocity.
+A count is a poor measurement of the position at a sample. It is off by up to half a count, for as long as the count
+stays. A change of the count is a better one: between the last sample and this one, the axis was at the border of two
+cells. It is off by the motion within half a sample at most, and this becomes less as the rate grows. Where the count
+does not change, the axis is still within its cell: this bounds the velocity.
 
 So this estimator makes edges from counts, and gives them to the filter of `edge_kalman`. Time is in halves of a sample.
 With f the count, k the number of the sample and d = f - f of the last sample:
@@ -13,22 +13,22 @@ With f the count, k the number of the sample and d = f - f of the last sample:
     0               no edge
 
 Everything else is the filter's: the innovation at an edge, the memory that an alarm shortens, the bound by silence, and
-the rest at which the velocity is exactly 0. A velocity is held against any edge only from the second one on.
+the rest at which the velocity is exactly 0.
 
 Derivation of the gains. The filter's table has a row for the time T between edges. An edge errs by its own error, and
-by the time at which it was passed. This time is uniform within a sample tau, in which an axis with an edge every T
-moves tau / T counts. An axis that passes several edges in a sample is uniform within a cell, a count. So
+by the time at which it was passed. This time is uniform within a sample tau. An axis with an edge every T moves tau / T
+counts in it. An axis that passes several edges in a sample is uniform within a cell, a count. So
 
     error**2 = edge_error**2 + min(1, tau / T)**2 / 12        counts**2
 
 and the memories and the bounds of the alarm follow from it as in `edge_kalman_design`. Slow edges are as good as with
-stamps. Where edges come every sample, the estimate is that of a filter of counts.
+stamps. Where edges come every sample, this is a filter of counts.
 
-Start, restart, saturation and wraps are the filter's. Its watch over bursts is left out: without stamps, edges in
-bursts cannot be told from a motion. A sample with `restart` has no edge.
+Start, restart, saturation and wraps are the filter's. A sample with `restart` has no edge. The watch over bursts is
+left out: without stamps, edges in bursts look like a motion.
 
-Source: as of `edge_kalman`. The error of a change of the count by time, in place of one by place, is the principle of
-fixed-position estimators (Brown, Schneider and Mulligan, IEEE Transactions on Industrial Electronics 39 (1992), 11).
+Source: as of `edge_kalman`. To take the time at a known position is the principle of fixed-position estimators: Brown,
+Schneider, Mulligan, IEEE Transactions on Industrial Electronics 39 (1992), 11.
 """
 
 import dataclasses
@@ -49,14 +49,14 @@ from .estimate import EstimatorDesign, estimate
 UNITS = 2
 """Units of time in a sample."""
 STEPS = 1 + edge_kalman_design.STEPS
-"""Clocks of the sequence: a clock to make the edge, and those of the filter."""
+"""Clocks of the sequence: one to make the edge, and the filter's."""
 
 
 class Filter(edge_kalman_design.Design):
     """Formats and table of the filter for edges whose times are known to a sample.
 
     Args:
-        axis: the axis, of which a clock is half a sample.
+        axis: the axis with a clock of `UNITS` clocks a sample.
         gains: as of `edge_kalman`.
     """
 
