@@ -82,6 +82,8 @@ PARAMETERS = {
     "controller.gains.levant.alpha_m_per_s2": Range(17.7, 400.0, "log"),
 }
 """The ranges that are searched, by key of the scene."""
+MEAN = {"protocol.mean_s": Range(0.02, 1.0, "log")}
+"""The range of one more, where the verdict is the paper's own: nothing else takes this mean."""
 
 
 @dataclass(frozen=True)
@@ -286,27 +288,33 @@ def study(
         NeverReached: if the handle, with the scene's own values, does not reach the wall.
     """
     judge, plain = _Judge(case, reading, mapper), case.scene
-    own = {key: _value(plain, key) for key in PARAMETERS}
+    ranges = searched(plain)
+    own = {key: value_of(plain, key) for key in ranges}
     before = judge.fully({})
     trials: list[Trial] = []
 
     def score(parts: np.ndarray) -> float:
-        ranges = zip(PARAMETERS.items(), parts, strict=True)
-        values = {key: where.at(part, plain.controller.sample_hz) for (key, where), part in ranges}
+        pairs = zip(ranges.items(), parts, strict=True)
+        values = {key: where.at(part, plain.controller.sample_hz) for (key, where), part in pairs}
         trials.append(judge.coarsely(values))
         progress(len(trials))
         return trials[-1].score
 
-    generations = max(round(evaluations / (MEMBERS * len(PARAMETERS))) - 1, 0)
+    generations = max(round(evaluations / (MEMBERS * len(ranges))) - 1, 0)
     options = {"popsize": MEMBERS, "maxiter": generations, "rng": seed, "tol": 0, "polish": False}
-    begin = [PARAMETERS[key].part(value) for key, value in own.items()]
-    scipy.optimize.differential_evolution(score, [(0.0, 1.0)] * len(PARAMETERS), x0=begin, **options)
+    begin = [ranges[key].part(value) for key, value in own.items()]
+    scipy.optimize.differential_evolution(score, [(0.0, 1.0)] * len(ranges), x0=begin, **options)
     best = {tuple(trial.values.items()): trial for trial in sorted(trials, key=lambda trial: -trial.score)}
     finalists = [judge.fully(trial.values) for trial in list(best.values())[::-1][:FINALISTS]]
     return Fit(reading, own, before, trials, sorted(finalists, key=lambda trial: trial.score))
 
 
-def _value(scene: Scene, key: str) -> float:
+def searched(scene: Scene) -> dict[str, Range]:
+    """Return the ranges that are searched for a scene, by key."""
+    return PARAMETERS | (MEAN if scene.protocol.verdict == "literal" else {})
+
+
+def value_of(scene: Scene, key: str) -> float:
     """Return the value of a key of a scene.
 
     Raises:

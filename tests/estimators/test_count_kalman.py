@@ -52,6 +52,9 @@ def stimulus(d: Design, samples: int):
     for k in range(120):
         count += (fast, 2 * d.filter.distance.max)[k // 20 % 2] * (1 if k // 40 % 2 else -1)
         yield count, 0
+    for _ in range(300):
+        count += fast
+        yield count, 0
     while samples > 0:
         style, pace, up = random.randrange(7), random.randrange(10), random.choice((-1, 1))
         every, where = random.randrange(1, 40), random.random()
