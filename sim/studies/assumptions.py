@@ -52,9 +52,17 @@ class Changed:
 
 @dataclass(frozen=True)
 class Assumptions:
-    """The result of the study: the scene, its changes with the scene as it is first, and the effort of their maps."""
+    """The result of the study.
+
+    Attributes:
+        scene: the scene.
+        values: its own values of what is changed, by dotted key.
+        rows: its changes; first the scene as it is.
+        effort: effort of the maps.
+    """
 
     scene: Scene
+    values: dict[str, Any]
     rows: list[Changed]
     effort: Effort
 
@@ -64,7 +72,7 @@ class Assumptions:
             {"changes": row.changes, "held": row.held, "facts": [asdict(fact) for fact in row.facts]}
             for row in self.rows
         ]
-        return {"scene": self.scene.name} | self.effort._asdict() | {"rows": rows}
+        return {"scene": self.scene.name, "values": self.values} | self.effort._asdict() | {"rows": rows}
 
     def tables(self) -> list[Table]:
         """Return the share of draws that show each fact, a row for each change."""
@@ -121,7 +129,8 @@ def study(case: Case, mapper: Mapper, progress: Callable[[int], None]) -> Assump
         maps = mapper("assumptions", [changed.changed(each.changes, each.label) for each in papers.values()])
         rows.append(Changed(changes, with_shares(dict(zip(papers, maps, strict=True)))))
         progress(len(rows))
-    return Assumptions(case.scene, rows, mapper.effort())
+    values = {key: value_of(case.scene, key) for row in rows for key in row.changes}
+    return Assumptions(case.scene, values, rows, mapper.effort())
 
 
 def _shown(value: Any) -> str:

@@ -10,9 +10,9 @@ paper's axes:
 - the largest K of that region should be on the K axis. The distance is the logarithm of the ratio.
 
 The scene's own values are one of the first trials, so a fit can continue from an earlier fit. Trials are mapped in
-coarse steps, on a shortened protocol. If the region of Levant with adjusted gains ends far (`FAR`) from the end of the
-B axis, the other maps are not made. No fact holds then. The `FINALISTS` with the least sum are then judged in full: in
-fine steps, on the scene's own protocol.
+coarse steps, on a shortened protocol unless the verdict is the paper's own. If the region of Levant with adjusted gains
+ends far (`FAR`) from the end of the B axis, the other maps are not made. No fact holds then. The `FINALISTS` with the
+least sum are then judged in full: in fine steps, on the scene's own protocol.
 """
 
 import math
@@ -234,7 +234,9 @@ class _Judge:
 
     def coarsely(self, values: dict[str, float]) -> Trial:
         """Return a trial in coarse steps, on a shortened protocol."""
-        case = self._case.changed(self._grid(COARSE) | SHORT | values)
+        # The paper's own verdict depends on when it is made.
+        short = {} if self._case.scene.protocol.verdict == "literal" else SHORT
+        case = self._case.changed(self._grid(COARSE) | short | values)
         try:
             papers = methods(case.scene)
             (adjusted,) = self._maps(papers, case, ["adjusted"]).values()
@@ -314,8 +316,8 @@ def searched(scene: Scene) -> dict[str, Range]:
     return PARAMETERS | (MEAN if scene.protocol.verdict == "literal" else {})
 
 
-def value_of(scene: Scene, key: str) -> float:
-    """Return the value of a key of a scene.
+def value_of(scene: Scene, key: str) -> Any:
+    """Return the value of a dotted key of a scene.
 
     Raises:
         SceneError: if the scene has no value for the key.
