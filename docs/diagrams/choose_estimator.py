@@ -19,7 +19,7 @@ LEAVES = {
     "edges": (Box(188, 492, 152, 78), "edge-kalman", "tolerates", "misplaced edges"),
     "fewest": (Box(372, 378, 84, 78), "window", "fewest cells", ""),
     "fewer": (Box(464, 378, 82, 78), "kalman", "fewer cells", ""),
-    "counts": (Box(554, 378, 126, 78), "count-kalman", "most accurate,", "without bursts"),
+    "counts": (Box(554, 378, 126, 78), "count-kalman", "short samples,", "no bursts"),
 }
 """Where the questions and the estimators are, and their words."""
 BUS = 332

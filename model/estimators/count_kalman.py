@@ -6,11 +6,15 @@ cells. It is off by the motion within half a sample at most, and this becomes le
 does not change, the axis is still within its cell: this bounds the velocity.
 
 So this estimator makes edges from counts, and gives them to the filter of `edge_kalman`. Time is in halves of a sample.
-With f the count, k the number of the sample and d = f - f of the last sample:
+With k the number of the sample and d the difference of its count from the last one:
 
     d = 1 or -1     the border was passed at 2 k - 1, in the middle between the samples
     larger          the last of several borders was passed at 2 k, near this sample
     0               no edge
+
+d is held within `step_max`, as in the other filters of counts: the counts that twice the largest speed moves in a
+sample, begun within a count, and one count for an edge out of place. What is beyond is a displacement of the scale,
+without later effect (flag `velocity_saturated`).
 
 Everything else is the filter's: the innovation at an edge, the memory that an alarm shortens, the bound by silence, and
 the rest at which the velocity is exactly 0.
@@ -24,8 +28,8 @@ counts in it. An axis that passes several edges in a sample is uniform within a 
 and the memories and the bounds of the alarm follow from it as in `edge_kalman_design`. Slow edges are as good as with
 stamps. Where edges come every sample, this is a filter of counts.
 
-Start, restart, saturation and wraps are the filter's. A sample with `restart` has no edge. The watch over bursts is
-left out: without stamps, edges in bursts look like a motion.
+Start, restart, saturation and wraps are as in the filter, whose flags are one here. A sample with `restart` has no
+edge. The watch over bursts finds none: without stamps, edges in bursts look like a motion.
 
 Source: as of `edge_kalman`. To take the time at a known position is the principle of fixed-position estimators: Brown,
 Schneider, Mulligan, IEEE Transactions on Industrial Electronics 39 (1992), 11.
@@ -38,13 +42,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arithmetic.fixed import wrap
+from ..arithmetic.fixed import saturate, wrap
 from ..encoder.quadrature import Seen
 from ..requirements import AxisRequirements
 from ..runtime.compiled import compiled
 from . import edge_kalman, edge_kalman_design
 from .edge_kalman_design import Gains
-from .estimate import EstimatorDesign, estimate
+from .estimate import EstimatorDesign, estimate, largest_step
 
 UNITS = 2
 """Units of time in a sample."""
@@ -66,10 +70,11 @@ class Filter(edge_kalman_design.Design):
 
 
 class Params(NamedTuple):
-    """Widths of the count and of the time, bits, and the integer kernel of the filter."""
+    """Widths of the count and of the time, bits; the largest difference of counts; the kernel of the filter."""
 
     count_width: int
     time_width: int
+    step_max: int
     filter: edge_kalman_design.Params
 
 
@@ -80,17 +85,22 @@ class FloatParams(NamedTuple):
 
 
 class State(NamedTuple):
-    """The last count, the times of this sample and of the last edge, that edge's direction, and the filter's state."""
+    """The last count, and the state of what the filter sees: the cell that the axis is in, times, and a direction.
+
+    `cell` is the count less the displacements of the scale. `now` is the time of this sample, `at` the time of the last
+    edge; `down` says whether it counted -1.
+    """
 
     running: int
     count: int  # type: ignore[assignment]  # a tuple has a method of this name
+    cell: int
     now: int
     at: int
     down: int
     filter: edge_kalman_design.State
 
 
-START = State(0, 0, 0, 0, 0, edge_kalman_design.START)
+START = State(0, 0, 0, 0, 0, 0, edge_kalman_design.START)
 FLOAT_START = START._replace(filter=edge_kalman_design.FLOAT_START)
 
 
@@ -99,6 +109,7 @@ class Design(EstimatorDesign):
 
     Attributes:
         filter: the design of the filter, on an axis with a clock of `UNITS` clocks a sample.
+        step_max: largest difference of counts.
         velocity: format of the output.
 
     Raises:
@@ -107,17 +118,21 @@ class Design(EstimatorDesign):
 
     name = "count-kalman"
     gains_class = Gains
-    flags = edge_kalman_design.Design.flags[:2]
     latency = STEPS
 
     def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
         known = {field.name: getattr(axis, field.name) for field in dataclasses.fields(AxisRequirements)}
         self.filter = Filter(AxisRequirements(**known | {"clock_hz": UNITS * axis.sample_hz}), gains)
-        self.velocity = self.filter.velocity
+        self.velocity, self.step_max = self.filter.velocity, largest_step(axis)
+
+    @property
+    def fastest(self) -> int:
+        """The velocity's word at a difference of counts that is limited at every sample."""
+        return min(self.step_max << self.velocity.f, self.velocity.max)
 
     def params(self, words: Mapping[str, int]) -> Params:
-        return Params(self.count_width, self.filter.stamp_width, self.filter.params({}))
+        return Params(self.count_width, self.filter.stamp_width, self.step_max, self.filter.params({}))
 
     def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
         """Return the float64 kernel's parameters: unrounded gains."""
@@ -128,37 +143,41 @@ class Design(EstimatorDesign):
 
 
 @compiled
-def _edge_of(params, state, count, fresh):
-    """Return (time of this sample, time of the last edge, whether that edge counted -1)."""
+def _edge(params, step_max, state, seen, fresh):
+    """Return (what the filter sees of this sample, the new state without the filter's, whether d was limited)."""
     mask = (1 << params.time_width) - 1
     now = (state.now + UNITS) & mask
-    moved = wrap(count - state.count, params.count_width)
+    moved = 0 if fresh else wrap(seen.count - state.count, params.count_width)
+    d = saturate(moved, -step_max, step_max)
+    cell = wrap(seen.count if fresh else state.cell + d, params.count_width)
+    at, down = state.at, state.down
     if fresh:
-        return now, now, 0
-    if moved == 0:
-        return now, state.at, state.down
-    return now, (now - int(abs(moved) == 1)) & mask, int(moved < 0)
+        at, down = now, 0
+    elif d != 0:
+        at, down = (now - int(abs(d) == 1)) & mask, int(d < 0)
+    # With a run of one edge the filter's watch over bursts finds none.
+    edge = Seen(cell, now, at, at, at, at, 0, down, 1)
+    return edge, State(1, seen.count, cell, now, at, down, state.filter), int(d != moved)
 
 
 @compiled
-def _seen(count, now, at, down):
-    """Return an edge as a decoder shows it."""
-    return Seen(count, now, at, at, at, at, 0, down, 1)
+def _with_filter(state, inner):
+    return State(state.running, state.count, state.cell, state.now, state.at, state.down, inner)
 
 
 @estimate.register(Params)
 @compiled
 def step(params, state, seen, restart):
-    now, at, down = _edge_of(params, state, seen.count, restart or not state.running)
-    inner, velocity, flags = edge_kalman.step(params.filter, state.filter, _seen(seen.count, now, at, down), restart)
-    return State(1, seen.count, now, at, down, inner), velocity, flags
+    edge, after, limited = _edge(params, params.step_max, state, seen, restart or not state.running)
+    inner, velocity, flags = edge_kalman.step(params.filter, state.filter, edge, restart)
+    return _with_filter(after, inner), velocity, int(limited or flags != 0)
 
 
 @estimate.register(FloatParams)
 @compiled
 def float_step(params, state, seen, restart):
     """Take one sample in float64, unsaturated: the same algorithm, as a reference for the cost of fixed point."""
-    now, at, down = _edge_of(params, state, seen.count, restart or not state.running)
-    edge = _seen(seen.count, now, at, down)
-    inner, velocity, flags = edge_kalman.float_step(params.filter, state.filter, edge, restart)
-    return State(1, seen.count, now, at, down, inner), velocity, flags
+    unlimited = 1 << params.count_width
+    edge, after, _ = _edge(params, unlimited, state, seen, restart or not state.running)
+    inner, velocity, _ = edge_kalman.float_step(params.filter, state.filter, edge, restart)
+    return _with_filter(after, inner), velocity, 0

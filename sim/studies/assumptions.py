@@ -1,9 +1,9 @@
 """Which facts of the founding paper's Figure 5 depend on what a scene assumes of the paper's device, and on the grid.
 
 The paper gives no mass, no friction, no delay and no threshold, and its steps of K and B were lost. So every assumed
-value is changed alone, down and up by `FACTOR`, as far as the search of `fit` would go; a delay by one sample. The
-steps of the grid are changed, too, and the protocol of the verdict. Each change has the maps of the paper's six
-methods, their facts, and the share of the draws of the starts that show each fact.
+value is changed alone, down and up by `FACTOR`, and a delay by one sample. A value beyond the range that `fit` searches
+is left out. The steps of the grid are changed, too, and the protocol of the verdict. Each change has the maps of the
+paper's six methods, their facts, and the share of the draws of the starts that show each fact.
 """
 
 from collections.abc import Callable, Iterator
@@ -14,9 +14,10 @@ from ...model.runtime.result import Table, table_of
 from ..scene.case import Case
 from ..scene.schema import Scene
 from ..walls.figure_5 import Fact, with_shares
+from ..walls.grid import grid_of
 from ..walls.mapping import Effort, Mapper
 from ..walls.methods import methods
-from .fit import searched, value_of
+from .fit import Range, searched, value_of
 
 FACTOR = 1.5
 """The factor by which a value is changed."""
@@ -77,10 +78,7 @@ class Assumptions:
     def tables(self) -> list[Table]:
         """Return the share of draws that show each fact, a row for each change."""
         numbers = [str(number) for number in range(1, len(self.rows[0].facts) + 1)]
-        rows = [
-            [row.text, *(f"{fact.share:.0%}" for fact in row.facts if fact.share is not None), str(row.held)]
-            for row in self.rows
-        ]
+        rows = [[row.text, *(f"{fact.share or 0:.0%}" for fact in row.facts), str(row.held)] for row in self.rows]
         return [table_of((self.scene.name,), (*numbers, "held"), rows)]
 
     def notes(self) -> list[str]:
@@ -97,17 +95,21 @@ def changes_of(scene: Scene) -> Iterator[dict[str, Any]]:
     """
     yield {}
     for key, where in searched(scene).items():
-        own = value_of(scene, key)
-        step = 1 / scene.controller.sample_hz
-        both = (own - step, own + step) if where.scale == "samples" else (own / FACTOR, own * FACTOR)
-        for value in both:
-            # A sum of samples is rounded in its last digits.
-            if where.low - step / 2 < value < where.high + step / 2:
-                yield {key: float(f"{max(value, 0.0):.3g}")}
+        for value in _beside(value_of(scene, key), where, scene.controller.sample_hz):
+            if where.low <= value <= where.high:
+                yield {key: value}
     for grid in GRIDS:
         yield {key: factor * value_of(scene, key) for key, factor in grid.items()}
     (other,) = (each for each in VERDICTS if each != scene.protocol.verdict)
     yield {"protocol.verdict": other}
+
+
+def _beside(own: float, where: Range, sample_hz: int) -> tuple[float, float]:
+    """Return the values below and above a scene's own one."""
+    if where.scale == "samples":
+        samples = round(own * sample_hz)
+        return (samples - 1) / sample_hz, (samples + 1) / sample_hz
+    return float(f"{own / FACTOR:.3g}"), float(f"{own * FACTOR:.3g}")
 
 
 def study(case: Case, mapper: Mapper, progress: Callable[[int], None]) -> Assumptions:
@@ -123,8 +125,10 @@ def study(case: Case, mapper: Mapper, progress: Callable[[int], None]) -> Assump
         NeverReached: if the handle of a change does not reach the wall.
     """
     rows: list[Changed] = []
-    for changes in changes_of(case.scene):
-        changed = case.changed(changes)
+    cases = [(changes, case.changed(changes)) for changes in changes_of(case.scene)]
+    for _, changed in cases:
+        grid_of(changed.scene)  # raises SceneError before anything is mapped
+    for changes, changed in cases:
         papers = methods(changed.scene)
         maps = mapper("assumptions", [changed.changed(each.changes, each.label) for each in papers.values()])
         rows.append(Changed(changes, with_shares(dict(zip(papers, maps, strict=True)))))

@@ -326,5 +326,5 @@ def value_of(scene: Scene, key: str) -> Any:
     for name in key.split("."):
         value = getattr(value, name, None)
     if value is None:
-        raise SceneError(f"{scene.name}: {key} is missing: the search begins from it")
+        raise SceneError(f"{scene.name}: {key} is missing, which this command changes")
     return value

@@ -105,7 +105,7 @@ def test_report_and_table_and_what_is_known_is_not_hit_again(monkeypatch, capsys
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["mhz"], "mhz: amplifier.delay_s is missing: the search begins from it"),
+        (["mhz"], "mhz: amplifier.delay_s is missing, which this command changes"),
         (["--axis", "1-10"], "--axis must be one of 3-30, 30-300, not '1-10'"),
         (
             ["--set", "controller.output=u1"],
