@@ -246,7 +246,7 @@ CASES = {
     ),
     "count-kalman": Case(
         partial(estimator, "count-kalman"),
-        (*MOVED, "now", "at", *STAMPED, *WEIGHTED),
+        (*MOVED, "cell", "now", "at", *STAMPED, *WEIGHTED),
         Bug(edge_kalman.Estimator._sample, "s.level + HALF", "s.level + 3 * HALF"),
         ranges.count_kalman,
         promise="no arithmetic wraps but where it is meant to; the sums of what is weighted are not looked at",
