@@ -55,6 +55,7 @@ COMMANDS = {
     "rendered": "Compare the stiffness and damping that a wall renders with those commanded, by frequency; and its "
     "rate-hardness.",
     "drop": "Test why Levant's stable region ends sharply at one damping, and which estimators have no such drop.",
+    "assumptions": "Show which facts of the paper's Figure 5 depend on which assumed value, and on the grid.",
     "fit": "Search mass, friction, delay and whatever else the paper omits, for a device that reproduces its Figure 5.",
 }
 """The purpose of every command in one line, which is all of its help except the options."""

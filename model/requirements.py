@@ -49,10 +49,10 @@ class AxisRequirements:
         travel_m: length of the workspace, m.
         speed_max_m_per_s: largest speed to estimate, m/s.
         acceleration_max_m_per_s2: bound C on the acceleration, m/s^2; sets default estimator gains.
-        jerk_max_m_per_s3: bound on the jerk between impacts, m/s^3; sets default gains of `edge-kalman` and of the
-            Levants of order 2 and 3. None for `jerk_bound_m_per_s3`.
+        jerk_max_m_per_s3: bound on the jerk between impacts, m/s^3; sets default gains of `edge-kalman`,
+            `count-kalman` and the Levants of order 2 and 3. None for `jerk_bound_m_per_s3`.
         edge_error_max_counts: RMS error of single edges of the encoder that estimates tolerate, counts; sets default
-            gains of `edge-kalman`, `mt` and `mt-divisionless`.
+            gains of `edge-kalman`, `count-kalman`, `mt` and `mt-divisionless`.
         force_max_n: largest drive, N.
         force_resolution_n: force LSB, N.
         stiffness_max_n_per_m: largest wall stiffness, N/m.

@@ -11,16 +11,15 @@ QUESTIONS = {
     "cells": (Box(20, 258, 272, 54), "logic cells left?", "edges are stamped"),
     "places": (Box(140, 378, 200, 56), "edges in their places?", ""),
     "counts": (Box(372, 258, 308, 54), "logic cells left?", "from counts alone"),
-    "bound": (Box(500, 378, 180, 56), "acceleration", "bound known?"),
 }
 LEAVES = {
     "axes": (Box(430, 14, 250, 58), "levant", "output u1", ""),
     "mt": (Box(20, 378, 100, 56), "mt", "few cells", ""),
     "places": (Box(20, 492, 152, 78), "levant-edge", "best at an impact", ""),
     "edges": (Box(188, 492, 152, 78), "edge-kalman", "tolerates", "misplaced edges"),
-    "fewest": (Box(372, 378, 92, 56), "window", "fewest cells", ""),
-    "counts": (Box(372, 492, 150, 78), "kalman", "most accurate", "from counts"),
-    "bound": (Box(536, 492, 144, 78), "levant-adaptive", "gains follow", "the signal"),
+    "fewest": (Box(372, 378, 84, 78), "window", "fewest cells", ""),
+    "fewer": (Box(464, 378, 82, 78), "kalman", "fewer cells", ""),
+    "counts": (Box(554, 378, 126, 78), "count-kalman", "short samples,", "no bursts"),
 }
 """Where the questions and the estimators are, and their words."""
 BUS = 332
@@ -31,8 +30,7 @@ def draw() -> str:
     """Return the diagram."""
     sheet = Sheet(592)
     for at, question, note in QUESTIONS.values():
-        second = () if not note else (note,) if at is QUESTIONS["bound"][0] else (small(note),)
-        sheet.box(at, question, *second, tone=GREY)
+        sheet.box(at, question, *((small(note),) if note else ()), tone=GREY)
     for at, name, *notes in LEAVES.values():
         if name not in ESTIMATORS:
             raise ValueError(f"a leaf must be one of {', '.join(ESTIMATORS)}, not {name!r}")
@@ -76,12 +74,10 @@ def _left(sheet: Sheet) -> None:
 
 def _right(sheet: Sheet) -> None:
     """Draw the answers where there are only counts."""
-    counts, bound = QUESTIONS["counts"][0], QUESTIONS["bound"][0]
-    _down(sheet, "fewer", 400, counts, LEAVES["fewest"][0])
-    _down(sheet, "kalman only", 479, counts, LEAVES["counts"][0])
-    _down(sheet, "levant-adaptive", 569, counts, bound)
-    _down(sheet, "yes", 511, bound, LEAVES["counts"][0])
-    _down(sheet, "no", 608, bound, LEAVES["bound"][0])
+    counts = QUESTIONS["counts"][0]
+    _down(sheet, "fewer", 396, counts, LEAVES["fewest"][0])
+    _down(sheet, "kalman only", 478, counts, LEAVES["fewer"][0])
+    _down(sheet, "count-kalman", 574, counts, LEAVES["counts"][0])
 
 
 def _down(sheet: Sheet, said: str, x: float, above: Box, below: Box) -> None:

@@ -24,6 +24,7 @@ VIEWS: dict[str, Callable[..., list[str]]] = {
     "without-jerk": walls.without_jerk,
     "regions": walls.maps,
     "facts": walls.facts,
+    "assumptions": walls.assumptions,
     "devices": walls.devices,
     "frictions": walls.frictions,
     "hands": walls.hands,

@@ -54,8 +54,50 @@ def maps(report: Report) -> list[str]:
 def facts(*reports: Report) -> list[str]:
     """Return the facts of the founding paper's Figure 5, and in how many draws each holds, a column a device."""
     heads = ["fact of the paper, and share of draws with it", *(f"`{report['scene']}`" for report in reports)]
-    same = zip(*(report["facts"] for report in reports), strict=True)
-    return table(heads, ([each[0]["text"], *(f"{100 * one['share']:.0f} %" for one in each)] for each in same))
+    same = enumerate(zip(*(report["facts"] for report in reports), strict=True), 1)
+    return table(
+        heads, ([f"{n}. {each[0]['text']}", *(f"{100 * one['share']:.0f} %" for one in each)] for n, each in same)
+    )
+
+
+NAMES = {
+    "handle.mass_kg": ("mass (g)", 1e-3),
+    "handle.viscous_n_s_per_m": ("viscous friction (N s/m)", 1.0),
+    "handle.coulomb_n": ("Coulomb friction (mN)", 1e-3),
+    "amplifier.delay_s": ("delay of the force (ms)", 1e-3),
+    "protocol.threshold_mm": ("threshold of the RMS (µm)", 1e-3),
+    "protocol.mean_s": ("time of the mean (s)", 1.0),
+    "controller.gains.levant.alpha_m_per_s2": ("adjusted alpha (m/s²)", 1.0),
+}
+"""What a table calls an assumed value, and its unit there."""
+GRID = {"zwidth.stiffness_step_n_per_m": "steps of K", "zwidth.damping_step_n_s_per_m": "steps of B"}
+VERDICTS = {"literal": "the paper's own", "detrended": "by the window's line"}
+
+
+def assumptions(report: Report) -> list[str]:
+    """Return every assumed value, and the facts that at least half of the draws show where it alone is changed."""
+    own, rows = report["values"], report["rows"]
+    found = [["as it is", "", "", _shown(rows[0])]]
+    for key, (name, unit) in NAMES.items():
+        alone = {row["changes"][key]: _shown(row) for row in rows if row["changes"].keys() == {key}}
+        ways = (
+            " / ".join(each for value, each in alone.items() if (value > own[key]) == more) for more in (False, True)
+        )
+        found += [[name, number(own[key] / unit), *ways]] if key in own else []
+    for row in rows:
+        steps = {key: value / own[key] for key, value in row["changes"].items() if key in GRID}
+        if steps:
+            names = " and ".join(f"{GRID[key]} times {number(factor)}" for key, factor in steps.items())
+            found.append([names, "", "", _shown(row)])
+        if verdict := row["changes"].get("protocol.verdict"):
+            found.append([f"verdict {VERDICTS[verdict]}", VERDICTS[own["protocol.verdict"]], "", _shown(row)])
+    return table(["assumed", "here", "facts with less", "facts with more, or with this"], found, numbers_from=1)
+
+
+def _shown(row: dict[str, Any]) -> str:
+    """Return the numbers of the facts that at least half of the draws show."""
+    held = [str(n) for n, fact in enumerate(row["facts"], 1) if fact["share"] >= 0.5]
+    return " ".join(held) or "none"
 
 
 def devices(*reports: Report) -> list[str]:

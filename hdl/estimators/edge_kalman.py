@@ -79,8 +79,7 @@ class Estimator(EstimatorBlock):
     def elaborate(self, platform):
         m = Module()
         s = Signals(self._design)
-        bursts = self._bursts(m)
-        m.d.comb += [s.bursts.eq(bursts.found), s.jolt.eq(bursts.jolt)]
+        self._watch(m, s)
         self._multiply(m, s)
         self._look_up(m, s)
         if self._design.scale is not None:
@@ -101,6 +100,11 @@ class Estimator(EstimatorBlock):
                     self._decide(m, s, name)
                     m.next = following
         return m
+
+    def _watch(self, m, s):
+        """Add the watch over bursts."""
+        bursts = self._bursts(m)
+        m.d.comb += [s.bursts.eq(bursts.found), s.jolt.eq(bursts.jolt)]
 
     def _multiply(self, m, s):
         """Add the multiplier. A product takes two clocks, its sum another, with which the next product may begin."""

@@ -4,6 +4,7 @@ from hardwall.model.estimators.estimate import EstimatorDesign
 
 from . import (
     butterworth,
+    count_kalman,
     edge_kalman,
     finite_difference,
     foaw,
@@ -36,6 +37,7 @@ ESTIMATORS: dict[str, type[EstimatorBlock]] = {
     "mt-divisionless": mt_divisionless.Estimator,
     "levant-edge": levant_edge.Estimator,
     "edge-kalman": edge_kalman.Estimator,
+    "count-kalman": count_kalman.Estimator,
     "levant-semi-implicit": levant_semi_implicit.Estimator,
     "levant-implicit": levant_implicit.Estimator,
     "levant-adaptive": levant_adaptive.Estimator,

@@ -228,10 +228,15 @@ class Design(EstimatorDesign):
         self._derive_motion(axis)
         self._derive_words()
 
-    def _memories(self, axis: AxisRequirements, gains: Gains, times_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _errors_counts(self, axis: AxisRequirements, gains: Gains, times_s: np.ndarray) -> np.ndarray:
+        """Return the RMS error of an edge by the interval before it, counts: its place, and its time at full speed."""
+        return np.full_like(times_s, math.hypot(gains.edge_error_counts, axis.edges_per_clock_max / math.sqrt(12)))
+
+    def _memories(
+        self, axis: AxisRequirements, gains: Gains, times_s: np.ndarray, errors_counts: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return the quiet and the agile memory for intervals, s."""
-        stamp = axis.edges_per_clock_max / math.sqrt(12)
-        error = math.hypot(gains.edge_error_counts, stamp) * axis.count_m * np.sqrt(times_s)
+        error = errors_counts * axis.count_m * np.sqrt(times_s)
         quiet = (QUIET * error / gains.jerk_m_per_s3) ** (2 / 7)
         agile = (AGILE * error / gains.acceleration_m_per_s2) ** (2 / 5)
         least, most = self._unit_s, self._unit_s * 2.0 ** (self.time_bits - 1)
@@ -244,7 +249,8 @@ class Design(EstimatorDesign):
         # A row is for the times from 2 to 3, or from 3 to 4, times a power of two; the middle is geometric.
         units = 2.0 ** (numbers // 2 - 1) * np.where(numbers % 2, math.sqrt(3), math.sqrt(1.5))
         times_s = units * self._unit_s
-        quiet, agile = self._memories(axis, gains, times_s)
+        errors = self._errors_counts(axis, gains, times_s)
+        quiet, agile = self._memories(axis, gains, times_s, errors)
         share = np.linspace(0, 1, LEVELS)[:, None]
         self.memories_s = quiet ** (1 - share) * agile**share
         index = times_s / self.memories_s
@@ -252,8 +258,7 @@ class Design(EstimatorDesign):
         blend = np.broadcast_to(-np.expm1(-times_s / agile), index.shape)
         # In the steady state r has the variance s**2 / (1 - K_x), and is white.
         free = np.maximum(1 - gain[..., 0], np.finfo(float).eps)
-        error = math.hypot(gains.edge_error_counts, axis.edges_per_clock_max / math.sqrt(12))
-        alarm = ALARM * error * np.sqrt(blend / (2 - blend) / free) * self._per_sample
+        alarm = ALARM * errors * np.sqrt(blend / (2 - blend) / free) * self._per_sample
         octaves = np.log2(quiet / agile) / (LEVELS - 1)
         fall = np.minimum(GROWTH * index / math.log(2), (LEVELS - 1) * octaves) / np.where(octaves > 0, octaves, 1)
         fall = np.where(octaves > 0, fall, LEVELS - 1)

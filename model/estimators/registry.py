@@ -8,6 +8,7 @@ add one line here and one in `hdl/estimators/registry.py`. The model's file has 
 
 from . import (
     butterworth,
+    count_kalman,
     edge_kalman,
     finite_difference,
     foaw,
@@ -40,6 +41,7 @@ ESTIMATORS: dict[str, type[EstimatorDesign]] = {
     "mt-divisionless": mt_divisionless.Design,
     "levant-edge": levant_edge.Design,
     "edge-kalman": edge_kalman.Design,
+    "count-kalman": count_kalman.Design,
     "levant-semi-implicit": levant_semi_implicit.Design,
     "levant-implicit": levant_implicit.Design,
     "levant-adaptive": levant_adaptive.Design,

@@ -39,8 +39,8 @@ SECTION = "controller."
 HIGHER = "levant-2", "levant-3", "levant-2-filtering", "levant-3-filtering"
 """The Levants whose bound is of a higher derivative than the acceleration."""
 BOUNDS = {
-    "jerk_max_counts_per_s3": (GAIN_RANGE, ("edge-kalman", *HIGHER)),
-    "edge_error_max_counts": (EDGE_ERROR_RANGE, ("edge-kalman", "mt", "mt-divisionless")),
+    "jerk_max_counts_per_s3": (GAIN_RANGE, ("edge-kalman", "count-kalman", *HIGHER)),
+    "edge_error_max_counts": (EDGE_ERROR_RANGE, ("edge-kalman", "count-kalman", "mt", "mt-divisionless")),
 }
 """The bounds by their keys: their ranges, and the estimators whose gains follow from them."""
 

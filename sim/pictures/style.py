@@ -66,6 +66,7 @@ COLOURS = {
     "mt-divisionless": "#C4A35A",
     "levant-edge": "#E69F00",
     "edge-kalman": "#661100",
+    "count-kalman": "#4D9221",
     "levant-semi-implicit": "#AA4499",
     "levant-implicit": "#882255",
     "levant-adaptive": "#332288",
@@ -77,7 +78,7 @@ COLOURS = {
     "foaw": "#3FA7D6",
     "least-squares": "#1F4E79",
 }
-MARKERS = dict(zip(COLOURS, "ovsDd<>12^8phX34|_P*H", strict=True))
+MARKERS = dict(zip(COLOURS, "ovsDd<>12^8HphX34|_P*x", strict=True))
 OTHER = {"color": "#000000", "marker": "."}
 """The style of an estimator that has no colour here yet."""
 FADED = 0.5

@@ -10,9 +10,9 @@ paper's axes:
 - the largest K of that region should be on the K axis. The distance is the logarithm of the ratio.
 
 The scene's own values are one of the first trials, so a fit can continue from an earlier fit. Trials are mapped in
-coarse steps, on a shortened protocol. If the region of Levant with adjusted gains ends far (`FAR`) from the end of the
-B axis, the other maps are not made. No fact holds then. The `FINALISTS` with the least sum are then judged in full: in
-fine steps, on the scene's own protocol.
+coarse steps, on a shortened protocol unless the verdict is the paper's own. If the region of Levant with adjusted gains
+ends far (`FAR`) from the end of the B axis, the other maps are not made. No fact holds then. The `FINALISTS` with the
+least sum are then judged in full: in fine steps, on the scene's own protocol.
 """
 
 import math
@@ -82,6 +82,8 @@ PARAMETERS = {
     "controller.gains.levant.alpha_m_per_s2": Range(17.7, 400.0, "log"),
 }
 """The ranges that are searched, by key of the scene."""
+MEAN = {"protocol.mean_s": Range(0.02, 1.0, "log")}
+"""The range of one more, where the verdict is the paper's own: nothing else takes this mean."""
 
 
 @dataclass(frozen=True)
@@ -232,7 +234,9 @@ class _Judge:
 
     def coarsely(self, values: dict[str, float]) -> Trial:
         """Return a trial in coarse steps, on a shortened protocol."""
-        case = self._case.changed(self._grid(COARSE) | SHORT | values)
+        # The paper's own verdict depends on when it is made.
+        short = {} if self._case.scene.protocol.verdict == "literal" else SHORT
+        case = self._case.changed(self._grid(COARSE) | short | values)
         try:
             papers = methods(case.scene)
             (adjusted,) = self._maps(papers, case, ["adjusted"]).values()
@@ -286,28 +290,34 @@ def study(
         NeverReached: if the handle, with the scene's own values, does not reach the wall.
     """
     judge, plain = _Judge(case, reading, mapper), case.scene
-    own = {key: _value(plain, key) for key in PARAMETERS}
+    ranges = searched(plain)
+    own = {key: value_of(plain, key) for key in ranges}
     before = judge.fully({})
     trials: list[Trial] = []
 
     def score(parts: np.ndarray) -> float:
-        ranges = zip(PARAMETERS.items(), parts, strict=True)
-        values = {key: where.at(part, plain.controller.sample_hz) for (key, where), part in ranges}
+        pairs = zip(ranges.items(), parts, strict=True)
+        values = {key: where.at(part, plain.controller.sample_hz) for (key, where), part in pairs}
         trials.append(judge.coarsely(values))
         progress(len(trials))
         return trials[-1].score
 
-    generations = max(round(evaluations / (MEMBERS * len(PARAMETERS))) - 1, 0)
+    generations = max(round(evaluations / (MEMBERS * len(ranges))) - 1, 0)
     options = {"popsize": MEMBERS, "maxiter": generations, "rng": seed, "tol": 0, "polish": False}
-    begin = [PARAMETERS[key].part(value) for key, value in own.items()]
-    scipy.optimize.differential_evolution(score, [(0.0, 1.0)] * len(PARAMETERS), x0=begin, **options)
+    begin = [ranges[key].part(value) for key, value in own.items()]
+    scipy.optimize.differential_evolution(score, [(0.0, 1.0)] * len(ranges), x0=begin, **options)
     best = {tuple(trial.values.items()): trial for trial in sorted(trials, key=lambda trial: -trial.score)}
     finalists = [judge.fully(trial.values) for trial in list(best.values())[::-1][:FINALISTS]]
     return Fit(reading, own, before, trials, sorted(finalists, key=lambda trial: trial.score))
 
 
-def _value(scene: Scene, key: str) -> float:
-    """Return the value of a key of a scene.
+def searched(scene: Scene) -> dict[str, Range]:
+    """Return the ranges that are searched for a scene, by key."""
+    return PARAMETERS | (MEAN if scene.protocol.verdict == "literal" else {})
+
+
+def value_of(scene: Scene, key: str) -> Any:
+    """Return the value of a dotted key of a scene.
 
     Raises:
         SceneError: if the scene has no value for the key.
@@ -316,5 +326,5 @@ def _value(scene: Scene, key: str) -> float:
     for name in key.split("."):
         value = getattr(value, name, None)
     if value is None:
-        raise SceneError(f"{scene.name}: {key} is missing: the search begins from it")
+        raise SceneError(f"{scene.name}: {key} is missing, which this command changes")
     return value

@@ -18,7 +18,19 @@ SEED = (load.FOLDER / "seed-2011.toml").read_text()
 STIFFNESS = "0, or 1.95313 (half of its word's LSB) to 200000 (what the controller is for)"
 DAMPING = "0, or 0.003125 (half of its word's LSB) to 400 (what the controller is for)"
 """What the wall of the scene `seed-2011` may be."""
-OF_ONE_AXIS_ALONE = ("bench", "cutoff", "drop", "fit", "gains", "lipschitz", "rates", "trade", "verilog", "zwidth")
+OF_ONE_AXIS_ALONE = (
+    "assumptions",
+    "bench",
+    "cutoff",
+    "drop",
+    "fit",
+    "gains",
+    "lipschitz",
+    "rates",
+    "trade",
+    "verilog",
+    "zwidth",
+)
 """Commands that take a scene of one axis."""
 
 

@@ -18,7 +18,7 @@ PARTS = {"fact", "map", "placed", "struck", "trial"}
 """Definitions of the schema that are no command's, but parts of several."""
 ELSEWHERE = {
     *("accuracy", "bench", "board", "capture", "choose", "config", "connect", "costs", "disarm", "fit", "home", "set"),
-    *("rivals", "synth", "watch"),
+    *("assumptions", "rivals", "synth", "watch"),
 }
 """Commands whose reports are held to the schema where their results are made."""
 RESULTS = {

@@ -166,6 +166,7 @@ def bound(axis: Axis, words: dict[str, int], output: str, steady: Steady, sample
     - A Levant's u moves its position, so that the mean is the way of that position. u1 differs from it by the mean of
       lambda sqrt(|e|), with |e| of a count at most, and by a step of alpha.
     - The mean of z1 differs by the mean correction of z0, for an error of some counts, and by half of that of z1.
+    - An edge that is made from counts errs by half a count at most, which a memory averages with gains that differ.
     - An estimator by stamps counts whole cycles of four edges, in a time that it knows to a clock. Those of every edge
       know the time of one, and `levant-edge` has a position, too.
     """
@@ -176,6 +177,9 @@ def bound(axis: Axis, words: dict[str, int], output: str, steady: Steady, sample
         if d.name not in ("levant-edge", "edge-kalman"):
             return speed / (4 * clocks - 1) + lsb
         return speed / clocks + lsb + (Fraction(2 * PLACES, samples) if d.name == "levant-edge" else 0)
+    if d.name == "count-kalman":
+        row = 2 * max(2, math.floor(2 / speed)).bit_length()
+        return lsb + Fraction(1 / (2 * d.filter.memories_s[-1, row] * axis.spec.sample_hz))
     if d.name in HIGHER:
         own = (d.lipschitz * 2.0 ** words[d.words[0].name]) ** (1 / (d.order + 1))
         first, second = (LAMBDA[d.degree - 1][n] * PLACES ** (n / d.degree) * own for n in (d.order, d.order - 1))

@@ -3,55 +3,16 @@
 import json
 import math
 
-import numpy as np
 import pytest
 
 from hardwall.sim.scene.case import Case
 from hardwall.sim.studies import fit
-from hardwall.sim.walls import methods
 from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.figure_5 import Fact
-from hardwall.sim.walls.grid import grid_of
 from hardwall.sim.walls.mapping import NeverReached
 from hardwall.sim.walls.zwidth import Map
-from stimuli import results
-from stimuli.figure_5 import PAPER
-from stimuli.maps import Known
+from stimuli.known_device import DELAY_S, MASS_KG, NAMES, KnownDevice, verdict
 from support.command_line import call
-
-MASS_KG, DELAY_S = 0.2, 1.4e-3
-NAMES = {curve.label: name for name, curve in methods.methods().items()}
-
-
-def largest_n_per_m(method: str, changes: dict, damping: float) -> float:
-    """Return K of the paper's figure, stretched over B by the error of the mass; an error of delay stiffens 1000 Hz."""
-    stretch = 0.3 * changes.get("handle.mass_kg", 0.35) / MASS_KG
-    points = [10.0 * (n + 1) * stretch for n in range(len(PAPER[method]))]
-    # K is constant between the figure's points, so a drop remains a drop.
-    place = int(np.searchsorted(points, damping + 1e-9)) - 1
-    inside = 0 <= place < len(points)
-    stiffer = 1 + 1e3 * abs(changes.get("amplifier.delay_s", 1e-3) - DELAY_S) * (method == "fdm-1000")
-    return 1e3 * PAPER[method][max(place, 0)] * stiffer if inside or place < 0 else 0.0
-
-
-class KnownDevice(Known):
-    """Maps of a known device."""
-
-    def __init__(self):
-        self.cases = []
-
-    def __call__(self, title: str, cases: list[Case]) -> list[Map]:
-        self.cases += cases
-        return [self._map(case) for case in cases]
-
-    def _map(self, case: Case) -> Map:
-        boundary = []
-        for damping in grid_of(case.scene).dampings:
-            stiffness = largest_n_per_m(NAMES[case.label], case.changes, damping)
-            boundary.append(BoundaryPoint(damping, stiffness, stiffness + 1e3))
-            if not stiffness:
-                break
-        return Map(case, boundary, 1, [True] * len(boundary))
 
 
 def found(evaluations: int, mapper: KnownDevice, seed: int = 1) -> fit.Fit:
@@ -122,17 +83,6 @@ def test_what_lacks_least_beside_the_others_is_what_stood_in_the_way():
     assert trials[3].score == pytest.approx(fit.NUMBER * (1 + fit.MISSED))
 
 
-def verdict(changes: dict, wall: tuple[float, float], **_) -> dict:
-    stiffness, damping = wall
-    estimator = changes["controller.estimator"]
-    gains = changes[f"controller.gains.{estimator}"]
-    name = f"fdm-{gains['cutoff_hz']:g}" if estimator == "butterworth" else "adjusted"
-    if gains == methods.PROPOSED:
-        name = "proposed"
-    stable = stiffness <= largest_n_per_m(name, changes, damping)
-    return results.verdict(stable)
-
-
 def test_report_and_table_and_what_is_known_is_not_hit_again(monkeypatch, capsys):
     monkeypatch.setattr("hardwall.sim.walls.mapping.verdict", verdict)
     words = ["fit", "--axis", "3-30", "--evaluations", 24, "--workers", 1]
@@ -155,7 +105,7 @@ def test_report_and_table_and_what_is_known_is_not_hit_again(monkeypatch, capsys
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["mhz"], "mhz: amplifier.delay_s is missing: the search begins from it"),
+        (["mhz"], "mhz: amplifier.delay_s is missing, which this command changes"),
         (["--axis", "1-10"], "--axis must be one of 3-30, 30-300, not '1-10'"),
         (
             ["--set", "controller.output=u1"],

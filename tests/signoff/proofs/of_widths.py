@@ -244,6 +244,13 @@ CASES = {
         ranges.edge_kalman,
         promise="no arithmetic wraps but where it is meant to; the sums of what is weighted are not looked at",
     ),
+    "count-kalman": Case(
+        partial(estimator, "count-kalman"),
+        (*MOVED, "cell", "now", "at", *STAMPED, *WEIGHTED),
+        Bug(edge_kalman.Estimator._sample, "s.level + HALF", "s.level + 3 * HALF"),
+        ranges.count_kalman,
+        promise="no arithmetic wraps but where it is meant to; the sums of what is weighted are not looked at",
+    ),
     "scale_map": Case(
         lambda axis: ScaleMap(Bins(12, -300, 3, 64, 16.0)),
         ("origin", "unshifted"),

@@ -10,6 +10,7 @@ from hardwall.hdl.wires import port
 from hardwall.model.arithmetic.divisionless import digits
 from hardwall.model.encoder.quadrature import START
 from hardwall.model.estimators.edge_kalman import TOP
+from hardwall.model.estimators.edge_kalman_design import Design
 from hardwall.model.estimators.foaw import TAPS
 from hardwall.model.estimators.levant_adaptive import RAISED
 
@@ -140,6 +141,16 @@ def levant_edge(bench: Bench, block: wiring.Component) -> None:
 
 
 def edge_kalman(bench: Bench, block: wiring.Component) -> None:
-    v_max, level = block.design.params({}).velocity_max, (0, TOP)
-    bench.within(v=v_max, line=v_max, held=v_max, bound=(0, 2 * v_max), level=level, lower=level)
-    bench.within(room=2 * v_max, least=(-2 * v_max, 0), most=(0, 2 * v_max), fastest=(0, 2 * v_max))
+    filter_of_edges(bench, block.design)
+
+
+def count_kalman(bench: Bench, block: wiring.Component) -> None:
+    filter_of_edges(bench, block.design.filter, "filter.")
+
+
+def filter_of_edges(bench: Bench, design: Design, path: str = "") -> None:
+    """Promise the ranges of the states of a filter at a path inside the block."""
+    v_max, level = design.params({}).velocity_max, (0, TOP)
+    ranges = {"v": v_max, "line": v_max, "held": v_max, "bound": (0, 2 * v_max), "level": level, "lower": level}
+    ranges |= {"room": 2 * v_max, "least": (-2 * v_max, 0), "most": (0, 2 * v_max), "fastest": (0, 2 * v_max)}
+    bench.within(**{path + name: bound for name, bound in ranges.items()})
