@@ -49,6 +49,7 @@ COMMANDS = {
     "(Figure 4 of the paper).",
     "trade": "Compare speed and accuracy: the time that a coarser backend, device, rate, solver or map saves, "
     "and its errors.",
+    "response": "Show gain and lead of an estimator on a sine, by its amplitude: its describing function.",
     "cutoff": "Find the best cutoff of the filter after a finite difference, by the area of the stable region.",
     "gains": "Search Levant's gains on a grid of lambda and alpha, by the area of the stable region, for both outputs.",
     "rates": "Find the stiffest stable wall by sample rate, 1 kHz to 1 MHz, and the part of the device that limits it.",

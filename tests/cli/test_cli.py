@@ -27,6 +27,7 @@ OF_ONE_AXIS_ALONE = (
     "gains",
     "lipschitz",
     "rates",
+    "response",
     "trade",
     "verilog",
     "zwidth",

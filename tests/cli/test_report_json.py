@@ -31,6 +31,7 @@ RESULTS = {
     "lipschitz": results.fit,
     "rates": results.rate_gains,
     "rendered": results.rendered_walls,
+    "response": results.responses,
     "replay": lambda: replay(swing(), coarsen=COARSEN),
     "trade": results.traded,
     "zwidth": results.maps,

@@ -25,6 +25,7 @@ from hardwall.sim.pictures import (
     lipschitz,
     rates,
     rendered,
+    response,
     trade,
     zwidth,
 )
@@ -77,6 +78,7 @@ PICTURES = {
     "figure 2": lambda: accuracy.draw(results.rows()),
     "axes": lambda: several.draw(results.axes_costs()),
     "bits": lambda: bits.draw(results.bits_dropped()),
+    "response": lambda: response.draw(results.responses()),
     "costs": lambda: costs.draw(results.costs_of_boards()),
     "cutoff": lambda: cutoff.draw(results.devices()),
     "gains": lambda: gains.draw(results.search()),

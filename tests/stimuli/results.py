@@ -11,7 +11,20 @@ from hardwall.sim.loop.record import Overview, Trace
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load, read
 from hardwall.sim.scene.tables import load_any
-from hardwall.sim.studies import axes, bits, costs, cutoff, drop, gains, lipschitz, rates, shortcuts, sines, trade
+from hardwall.sim.studies import (
+    axes,
+    bits,
+    costs,
+    cutoff,
+    drop,
+    gains,
+    lipschitz,
+    rates,
+    response,
+    shortcuts,
+    sines,
+    trade,
+)
 from hardwall.sim.studies.accuracy import Accuracy
 from hardwall.sim.studies.drop_result import Drop, End, Law, Shaken
 from hardwall.sim.studies.rendered import Moving, Rendered
@@ -125,6 +138,24 @@ def bits_dropped() -> bits.Bits:
         for dropped in list(bits.DROPPED)[:3]
     ]
     return bits.Bits(rows)
+
+
+def responses() -> response.Responses:
+    """Return the responses of two estimators, one of which shows nothing of the smallest sine."""
+    rows = [
+        {"estimator": name, "output": "u", "sample_hz": 10_000, "frequency_hz": hz, "amplitude_counts": counts}
+        | {
+            "gain": gain,
+            "lead_deg": None if not gain else -0.1 * hz * scale,
+            "gain_from": gain / 2,
+            "gain_to": 2 * gain,
+        }
+        | {"flags": []}
+        for name, scale in (("fdm", 1), ("levant", 2))
+        for counts, gain in ((0.5, 0.0), (10.0, 0.9), (100.0, 1.0 / scale))
+        for hz in (70.0, 200.0)
+    ]
+    return response.Responses(rows, "seed-2011", [row["estimator"] for row in rows])
 
 
 def costs_of_boards() -> costs.Costs:

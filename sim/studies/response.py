@@ -1,0 +1,221 @@
+"""The response of a velocity estimator to a sine, by its frequency and amplitude: what is called describing function.
+
+The handle moves by A sin(2 pi f t) beside a place in a count. The encoder has no errors, and the axis is the scene's.
+The fundamental of the estimate is fitted over whole periods by least squares, with a constant, and divided by the exact
+velocity at the same samples. The quotient's magnitude is the *gain*, its angle the *lead*: negative for an estimate
+that comes late. A linear filter has one response for all amplitudes, but for the quantisation. One that is not linear
+has another at each. A limit cycle at a wall has an amplitude of a few counts, a hit of some hundred.
+
+Starts differ by the place in a count and the phase of the sine: `walls.starts`.
+
+Source for the method: Gelb, Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design, 1968.
+"""
+
+import cmath
+import math
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...model import stamped
+from ...model.axis.design import strobe_of
+from ...model.runtime.result import Rows, Table, table_of
+from ..loop.backends import whole
+from ..scene.case import Case
+from ..scene.schema import Scene
+from ..walls.methods import Curve
+from ..walls.starts import start
+
+METHODS = "fdm-1000", "kalman", "levant", "levant-2"
+LEVELS = np.array([0, 1, 3, 2])
+"""The levels of the pins, a | b << 1, at a count modulo 4."""
+PERIODS, SETTLE_S = 8, 0.15
+"""The fewest periods, and the shortest time, before the fit and in it."""
+SAMPLES_MAX = 10_000_000
+"""The most samples of a run."""
+AMPLITUDES = 0.5, 1e6
+"""The least and the largest amplitude, counts: a smaller one is seen at some places in a count only."""
+
+
+class Sine(NamedTuple):
+    """A motion of an encoder, in counts: amplitude sin(2 pi frequency t + phase) + place."""
+
+    amplitude: float
+    frequency_hz: float
+    phase: float  # rad
+    place: float  # counts
+
+    def at(self, times_s: np.ndarray) -> np.ndarray:
+        """Return the positions, counts."""
+        return self.amplitude * np.sin(math.tau * self.frequency_hz * times_s + self.phase) + self.place
+
+    def passed(self, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the times (s) from 0 on at which the count changes, ascending, and the counts from then on."""
+        low, high = math.floor(self.place - self.amplitude), math.floor(self.place + self.amplitude)
+        borders = np.arange(low, high + 2)
+        borders = borders[np.abs(borders - self.place) < self.amplitude]
+        rise = np.arcsin((borders - self.place) / self.amplitude)
+        # Upwards a border is the first place of its count; downwards it is the end of that count.
+        angles = np.concatenate([rise, math.pi - rise]) - self.phase
+        counts = np.concatenate([borders, borders - 1])
+        turns = np.arange(-2, math.ceil(seconds * self.frequency_hz) + 2)
+        times = (angles[:, None] + math.tau * turns) / (math.tau * self.frequency_hz)
+        every = np.broadcast_to(counts[:, None], times.shape)
+        order = np.argsort(times, axis=None, kind="stable")
+        times, every = times.ravel()[order], every.ravel()[order]
+        inside = (times > 0) & (times <= seconds)
+        return times[inside], every[inside]
+
+
+@dataclass(frozen=True)
+class Responses(Rows):
+    """Gains and leads: rows of `respond`.
+
+    Attributes:
+        scene: name of the scene.
+        labels: of every row, the name of its estimator.
+    """
+
+    scene: str
+    labels: list[str]
+
+    def report(self) -> dict[str, Any]:
+        """Return what the command line prints, units in the keys."""
+        return {"scene": self.scene, **super().report()}
+
+    @property
+    def frequencies_hz(self) -> list[float]:
+        """The frequencies, in their order."""
+        return list(dict.fromkeys(row["frequency_hz"] for row in self.rows))
+
+    def tables(self) -> list[Table]:
+        """Return a table with a line for each estimator and amplitude, and two columns for each frequency."""
+        heads = ["amplitude (counts)"]
+        for each in self.frequencies_hz:
+            heads += [f"gain at {each:g} Hz", f"lead at {each:g} Hz (deg)"]
+        lines: dict[tuple[str, float], list[str]] = {}
+        for name, row in zip(self.labels, self.rows, strict=True):
+            cells = [f"{row['gain']:.3f}", "-" if row["lead_deg"] is None else f"{row['lead_deg']:+.1f}"]
+            lines.setdefault((name, row["amplitude_counts"]), []).extend(cells)
+        rows = [[name, f"{amplitude:g}", *cells] for (name, amplitude), cells in lines.items()]
+        return [table_of(("estimator",), heads, rows)]
+
+
+def seconds_of(frequency_hz: float) -> float:
+    """Return the time before the fit, which is that of the fit too: whole periods."""
+    return max(PERIODS, math.ceil(SETTLE_S * frequency_hz)) / frequency_hz
+
+
+def cases(case: Case, curves: list[Curve]) -> list[Case]:
+    """Return the case of every estimator.
+
+    Raises:
+        SceneError: if the scene is not valid with one of them.
+    """
+    found = [case.changed(each.changes, each.label) for each in curves]
+    for each in found:
+        _ = each.scene.spec
+    return found
+
+
+def check(case: Case, frequencies_hz: list[float], amplitudes: list[float]) -> None:
+    """Raise ValueError, in one line with the accepted range, if a scene's axis cannot follow a sine, or it takes long.
+
+    Args:
+        case: the scene.
+        frequencies_hz, amplitudes: those that are asked for, Hz and counts.
+    """
+    spec = case.scene.spec
+    for frequency in frequencies_hz:
+        if frequency > spec.sample_hz / 4:
+            most = spec.sample_hz / 4
+            raise ValueError(
+                f"--frequencies must be at most a quarter of the sample rate, {most:g} Hz, not {frequency:g}"
+            )
+        if 2 * seconds_of(frequency) * spec.sample_hz > SAMPLES_MAX:
+            least = 2 * PERIODS * spec.sample_hz / SAMPLES_MAX
+            raise ValueError(f"--frequencies must be at least {least:g} Hz at this rate, not {frequency:g}")
+    largest_hz = max(frequencies_hz)
+    most = spec.speed_max_m_per_s / spec.count_m / (math.tau * largest_hz)
+    if max(amplitudes) > most:
+        raise ValueError(
+            f"--amplitudes must be at most {most:.4g} counts at {largest_hz:g} Hz, where the axis is at its largest "
+            f"speed, not {max(amplitudes):g}"
+        )
+
+
+def jobs(
+    every: list[Case], frequencies_hz: list[float], amplitudes: list[float], starts: int, backend: str
+) -> list[dict[str, Any]]:
+    """Return the arguments of `respond` for every case, amplitude and frequency."""
+    return [
+        case.job() | {"frequency_hz": hz, "amplitude_counts": counts, "starts": starts, "backend": backend}
+        for case, counts, hz in product(every, amplitudes, frequencies_hz)
+    ]
+
+
+def respond(
+    scene: str,
+    text: str,
+    changes: dict[str, Any],
+    frequency_hz: float,
+    amplitude_counts: float,
+    starts: int,
+    backend: str,
+) -> dict[str, Any]:
+    """Return the response of the estimator of a scene to one sine, units in the keys.
+
+    Args:
+        scene, text, changes: the scene: see `Case`.
+        frequency_hz, amplitude_counts: the sine.
+        starts: number of starts.
+        backend: `float` or `fixed`.
+
+    Returns:
+        estimator, output, sample_hz, frequency_hz, amplitude_counts: what was moved.
+        gain, lead_deg: of the mean over the starts; no lead where the gain is 0.
+        gain_from, gain_to: the least and the largest gain of a start.
+        flags: names of the estimator's flags that were raised.
+    """
+    own = Case("", scene, text, changes).scene
+    every, raised = [], 0
+    for number in range(starts):
+        place, phase = start(number)
+        quotient, flags = response(own, backend, Sine(amplitude_counts, frequency_hz, math.tau * phase, place))
+        every.append(quotient)
+        raised |= flags
+    mean = sum(every) / starts
+    known = own.spec.design.estimator.flags
+    return {
+        "estimator": own.controller.estimator,
+        "output": own.estimator_output,
+        "sample_hz": own.spec.sample_hz,
+        "frequency_hz": frequency_hz,
+        "amplitude_counts": amplitude_counts,
+        "gain": abs(mean),
+        "lead_deg": math.degrees(cmath.phase(mean)) if mean else None,
+        "gain_from": min(map(abs, every)),
+        "gain_to": max(map(abs, every)),
+        "flags": [name for name in own.spec.design.flag_names(raised) if name in known],
+    }
+
+
+def response(scene: Scene, backend: str, sine: Sine) -> tuple[complex, int]:
+    """Return the estimate's fundamental divided by that of the velocity, and the flags of the whole run."""
+    spec, seconds = scene.spec, seconds_of(sine.frequency_hz)
+    chosen = spec.design.estimator.choose(scene.estimator_output)
+    axis = whole(spec, backend, chosen | {"encoder_glitch_clocks": scene.glitch_clocks})
+    samples = math.ceil(2 * seconds * spec.sample_hz)
+    times, counts = sine.passed(2 * seconds)
+    first = int(np.floor(sine.at(np.zeros(1)))[0])
+    clocks = np.ceil(times * spec.clock_hz).astype(np.int64)
+    record = stamped.run(axis, clocks, LEVELS[counts % 4], samples, int(LEVELS[first % 4]))
+    at_s = strobe_of(axis.design.timing, np.arange(samples)) / spec.clock_hz
+    fitted = slice(samples - round(seconds * spec.sample_hz), None)
+    angles = math.tau * sine.frequency_hz * at_s[fitted] + sine.phase
+    basis = np.stack([np.cos(angles), np.sin(angles), np.ones(len(angles))], axis=1)
+    cosine, minus_sine, _ = np.linalg.lstsq(basis, record.velocity_m_per_s[fitted] / spec.count_m)[0].tolist()
+    peak = math.tau * sine.frequency_hz * sine.amplitude
+    return complex(cosine, -minus_sine) / peak, int(record.flags[-1])

@@ -1,0 +1,139 @@
+"""The response to a sine: its edges against its counts, and gains against what is known of filters and quantisers."""
+
+import cmath
+import json
+import math
+
+import numpy as np
+import pytest
+import scipy
+
+from hardwall.sim.scene.case import Case
+from hardwall.sim.studies import response
+from hardwall.sim.studies.response import Sine
+from hardwall.sim.walls.methods import Curve
+from support.command_line import call
+from support.reports import check
+
+SCENE = "seed-2011"
+SAMPLE_HZ = 10_000
+PLAIN = Curve("fdm", "fdm", "u")
+
+
+def quotient(sine: Sine, backend: str = "fixed", estimator: str = "fdm", **changes) -> complex:
+    scene = Case.of(SCENE, {"controller.estimator": estimator} | changes).scene
+    found, flags = response.response(scene, backend, sine)
+    assert not flags
+    return found
+
+
+@pytest.mark.parametrize(
+    "sine",
+    [Sine(0.5, 20.0, 0.3, 0.75), Sine(3.1, 70.0, 2.0, 0.0), Sine(12.34, 3.3, 5.9, 0.61), Sine(200.0, 170.0, 0, 0.5)],
+)
+def test_between_the_edges_of_a_sine_the_count_is_its_floor(sine):
+    times, counts = sine.passed(0.5)
+    assert (np.diff(times) > 0).all()
+    assert (np.abs(np.diff(counts)) == 1).all()
+    middles = (times[:-1] + times[1:]) / 2
+    assert (np.floor(sine.at(middles)) == counts[:-1]).all()
+    # In each period every border is passed twice.
+    borders = math.ceil(sine.place + sine.amplitude) - math.floor(sine.place - sine.amplitude) - 1
+    assert abs(len(times) - 2 * borders * 0.5 * sine.frequency_hz) <= 2 * borders
+
+
+def test_a_sine_within_a_count_shows_nothing():
+    times, _ = Sine(0.5, 20.0, 0.0, 0.5).passed(1.0)
+    assert not len(times)
+    assert quotient(Sine(0.5, 20.0, 0.0, 0.5)) == 0
+
+
+@pytest.mark.parametrize("backend", ["fixed", "float"])
+@pytest.mark.parametrize("hz", [20.0, 70.0, 333.0])
+def test_a_finite_difference_has_the_response_of_one(backend, hz):
+    """(1 - exp(-j w T)) / (j w T), but for the quantisation: 4 / pi of half a count at most, as of any square wave."""
+    step = 1j * math.tau * hz / SAMPLE_HZ
+    exact = (1 - cmath.exp(-step)) / step
+    for amplitude in (50.0, 1000.0):
+        found = quotient(Sine(amplitude, hz, 1.0, 0.3), backend)
+        assert abs(found - exact) <= 2 / math.pi / amplitude
+
+
+def test_a_few_counts_have_the_gain_of_a_quantiser():
+    """A sine that is rounded to counts: 4 / (pi A) times the sum of sqrt(1 - ((2 i - 1) / (2 A))^2), for 2 i - 1 < 2 A.
+
+    Source: Gelb, Vander Velde 1968, of the quantiser with uniform steps. A sample is late by a sample at most.
+    """
+    hz = 10.0
+    late = math.tau * hz / SAMPLE_HZ
+    for amplitude in (0.75, 1.2, 2.0, 3.7, 10.0):
+        steps = range(1, math.floor(amplitude + 0.5) + 1)
+        rounded = 4 / (math.pi * amplitude) * sum(math.sqrt(1 - ((i - 0.5) / amplitude) ** 2) for i in steps)
+        # A place of half a count makes the floor a rounding.
+        found = quotient(Sine(amplitude, hz, 0.7, 0.5))
+        assert abs(found) == pytest.approx(rounded, abs=rounded * late)
+        assert cmath.phase(found) == pytest.approx(0, abs=late)
+
+
+def test_a_butterworth_has_the_response_of_scipy_s():
+    hz, changes = 150.0, {"controller.gains.butterworth": {"cutoff_hz": 1000.0}}
+    _, (filtered,) = scipy.signal.freqz(*scipy.signal.butter(2, 1000.0, fs=SAMPLE_HZ), worN=[hz], fs=SAMPLE_HZ)
+    step = 1j * math.tau * hz / SAMPLE_HZ
+    exact = filtered * (1 - cmath.exp(-step)) / step
+    found = quotient(Sine(1000.0, hz, 0.2, 0.1), estimator="butterworth", **changes)
+    # Its coefficients have 12 bits.
+    assert abs(found - exact) <= 2 / math.pi / 1000 + 2**-10
+
+
+def test_edges_reach_an_estimator_by_stamps():
+    found = quotient(Sine(50.0, 20.0, 1.0, 0.3), estimator="edge-kalman")
+    assert abs(found - 1) < 0.03
+
+
+def test_a_filter_is_the_same_at_all_amplitudes_and_levant_is_not():
+    every = response.cases(Case.of(SCENE), [PLAIN, Curve("levant u1", "levant", "u1")])
+    rows = [response.respond(**job) for job in response.jobs(every, [200.0], [20.0, 200.0], 3, "fixed")]
+    assert [row["estimator"] for row in rows] == ["fdm", "fdm", "levant", "levant"]
+    few, many, near, far = (row["gain"] for row in rows)
+    assert few == pytest.approx(many, abs=0.05)
+    # Beyond its alpha, 50 m/s^2, the estimate is a triangle that the velocity has left behind.
+    assert near > 0.9
+    assert far < 0.3
+    assert all(row["gain_from"] <= row["gain_to"] and row["flags"] == [] for row in rows)
+
+
+def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
+    picture = tmp_path / "response.png"
+    words = ["response", "--estimators", "fdm,levant:u1", "--frequencies", "70,200", "--amplitudes", "0.5,20"]
+    words += ["--starts", 2, "--workers", 1]
+    code, out, _ = call(monkeypatch, capsys, *words, "--json", "--plot", picture)
+    assert code == 0
+    report = json.loads(out)
+    check("response", report)
+    assert [(row["estimator"], row["amplitude_counts"], row["frequency_hz"]) for row in report["rows"]] == [
+        (name, counts, hz) for name in ("fdm", "levant") for counts in (0.5, 20.0) for hz in (70.0, 200.0)
+    ]
+    assert picture.stat().st_size > 0
+    code, out, _ = call(monkeypatch, capsys, *words)
+    assert code == 0
+    assert "gain" in out
+    assert "levant u1" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--frequencies", "2600"], "--frequencies must be at most a quarter of the sample rate, 2500 Hz, not 2600"),
+        (["--frequencies", "0.01"], "--frequencies must be at least 0.016 Hz at this rate, not 0.01"),
+        (["--frequencies", "x"], "--frequencies must be numbers of 0.001 to 1e+07 Hz, not 'x'"),
+        (["--amplitudes", "0.4"], "--amplitudes must be numbers of 0.5 to 1e+06 counts, not '0.4'"),
+        (["--amplitudes", "1e4"], "--amplitudes must be at most 1592 counts at 200 Hz"),
+        (["--estimators", "best"], "--estimators: estimator must be one of "),
+        (["--set", "controller.output=u1"], "--set 'controller.output' must be absent (this command sets it)"),
+        (["eight-axes"], "eight-axes: has several axes"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_line(monkeypatch, capsys, arguments, message):
+    code, out, err = call(monkeypatch, capsys, "response", *arguments)
+    assert (code, out) == (2, "")
+    assert message in err
