@@ -9,6 +9,7 @@ import pytest
 from hardwall.model import stamped
 from hardwall.model.axis.design import Timing
 from hardwall.model.encoder import quadrature
+from hardwall.model.estimators.acceleration import Velocities
 from hardwall.sim.estimates.replay import replay
 from hardwall.sim.estimates.replay_axis import run
 from hardwall.sim.estimates.through_pins import through_pins
@@ -91,10 +92,10 @@ def test_every_strobe_sees_the_recorded_count(clocks):
     # A finite difference as wide as the count.
     axis = axis._replace(estimator=axis.estimator._replace(count_width=width, velocity_max=2**width))
     state = stamped.State(0, 0, 0, 0, quadrature.START, spec.design.start(), 0, int(level(0)))
-    controller, velocity = stamped.Controller(decoder, 0, 0, axis), np.zeros(len(counts), np.int64)
+    controller, made = stamped.Controller(decoder, 0, 0, axis), Velocities(np.zeros(len(counts), np.int64))
     edges = stamped.room_for(2 * clocks)
     state, left = through_pins(
-        controller, state, Timing(clocks, clocks - 1, 30), counts, velocity, edges, 0, 0, len(counts)
+        controller, state, Timing(clocks, clocks - 1, 30), counts, made, edges, 0, 0, len(counts)
     )
-    assert velocity.tolist() == np.diff(counts, prepend=0).tolist()
+    assert made.velocity.tolist() == np.diff(counts, prepend=0).tolist()
     assert (left, state.flags) == (0, 0)
