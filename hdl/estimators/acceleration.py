@@ -1,4 +1,4 @@
-"""The member that an estimator with an acceleration has besides those of every estimator."""
+"""A velocity estimator with a second output, the acceleration."""
 
 from amaranth.lib.wiring import Member, Out
 

@@ -32,7 +32,7 @@ def acceleration_of(params, state):
 
     Args:
         params: what an `Accelerated` design's `params` or `float_params` returns.
-        state: the state that `estimate` has returned, or that of `start`, whose acceleration is 0.
+        state: what `estimate` has returned; or what `start` has, with an acceleration of 0.
 
     Returns:
         A word of the design's `acceleration` format; with float parameters, counts a sample^2.
