@@ -198,7 +198,7 @@ class EdgeVelocityEstimator:
         counts: ArrayLike,
         until_s: ArrayLike | None,
         kind: type[Velocities] | type[Motions],
-    ) -> Velocities | Motions:
+    ) -> tuple[np.ndarray, ...]:
         """Return the outputs of a kind for the samples that further edges complete."""
         known = len(self._last[0])
         times = times_of(times_s, self._last[0] if known else None)
