@@ -1,8 +1,8 @@
 """Bit-accurate reference of every hardware block: integers in, the same integers as the RTL out.
 
-For studies: `velocity` and `velocity_of_edges` in one call, `VelocityEstimator` and `EdgeVelocityEstimator` with their
-`Motion` for a record in pieces, and `Sampler` for a loop of one's own. They are loaded when they are first used;
-`__init__.pyi` has their types.
+For studies: `velocity` and `velocity_of_edges` in one call, and both with the acceleration; `VelocityEstimator` and
+`EdgeVelocityEstimator` with their `Motion` for a record in pieces; and `Sampler` for a loop of one's own. They are
+loaded when they are first used; `__init__.pyi` has their types.
 """
 
 from importlib import import_module
@@ -15,6 +15,8 @@ _HOMES = {
     "Sampler": "sampler",
     "VelocityEstimator": "velocity_estimator",
     "velocity": "records",
+    "velocity_and_acceleration": "records",
+    "velocity_and_acceleration_of_edges": "records",
     "velocity_of_edges": "records",
 }
 __all__ = list(_HOMES)

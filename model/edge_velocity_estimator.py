@@ -14,13 +14,14 @@ from .axis.axis import Axis
 from .axis.design import Timing, strobe_of
 from .edge_times import check_edges, check_length, clocks_of, sample_of, since, times_of
 from .encoder.level import level
+from .estimators.acceleration import Motions, Velocities, keep
 from .estimators.estimate import EstimatorGains
 from .motion import Motion
 from .record_axis import DECODER_CLOCKS, axis_of
 from .record_time import RecordTime
 from .runtime.compiled import compiled
 from .stamped import Controller, Edges, State, controller, decode, sample
-from .velocity_estimator import is_floating, output_of
+from .velocity_estimator import check_accelerated, is_floating, output_of, units_of
 
 CLOCK_HZ, CLOCKS = 100e6, 1 << 16
 """The lowest rate of the stamping clock, Hz, unless a sample would then have more clocks than this number."""
@@ -29,25 +30,25 @@ CLOCK_RANGE = 1e-6, 2.0**48
 
 @compiled
 def run(
-    params: Controller, state: State, timing: Timing, edges: Edges, first: int, velocity: np.ndarray
+    params: Controller, state: State, timing: Timing, edges: Edges, first: int, made: Velocities | Motions
 ) -> tuple[State, int]:
-    """Fill `velocity`, of one sample or more, from sample `first` on; return the state and the number of edges taken.
+    """Fill `made`, of one sample or more, from sample `first` on; return the state and the number of edges taken.
 
     The decoder of the state is behind by its latency: edges that come later may lie between there and the last sample.
     """
-    taken, last = 0, len(velocity) - 1
+    taken, last = 0, len(made.velocity) - 1
     for k in range(last):
         rest = Edges(edges.clocks[taken:], edges.levels[taken:])
         state, more = sample(params, state, rest, len(rest.clocks), strobe_of(timing, first + k))
         taken += more
-        velocity[k] = state.velocity
+        keep(made, k, state.velocity, params.axis.estimator, state.axis.estimator)
     strobe = strobe_of(timing, first + last)
     rest = Edges(edges.clocks[taken:], edges.levels[taken:])
     before, more = decode(params, state, rest, len(rest.clocks), strobe - DECODER_CLOCKS)
     taken += more
     rest = Edges(edges.clocks[taken:], edges.levels[taken:])
     after, more = sample(params, before, rest, len(rest.clocks), strobe)
-    velocity[last] = after.velocity
+    keep(made, last, after.velocity, params.axis.estimator, after.axis.estimator)
     kept = State(
         after.drive, after.velocity, after.force, after.flags, before.decoder, after.axis, before.clock, before.level
     )
@@ -107,7 +108,7 @@ class EdgeVelocityEstimator:
         design = self.spec.design.estimator
         self.words = self._time.words(word for word in design.words if word.name != design.output_word())
         self._choice: dict[str, Any] = design.choose(output)
-        self._unit = (1.0 if self._floating else design.velocity.lsb) * motion.count * sample_hz
+        self._units = units_of(design, self._floating, motion.count, sample_hz)
         self._settings: dict[str, float] = {}
         self.set(**settings)
         self.reset()
@@ -166,6 +167,39 @@ class EdgeVelocityEstimator:
                 number than 1; if edges come faster than the clock, or there is no start; if `until_s` is before an
                 edge, or there are more than `edge_times.SAMPLES_MAX` samples. The state has not changed then.
         """
+        (velocity,) = self._taken(times_s, counts, until_s, Velocities)
+        return velocity
+
+    def with_acceleration(
+        self, times_s: ArrayLike, counts: ArrayLike, until_s: ArrayLike | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the velocities and the accelerations of the samples that further edges complete.
+
+        Pieces may also be taken in turns with calls.
+
+        Args:
+            times_s, counts, until_s: as of a call.
+
+        Returns:
+            Two arrays of float64, shape (samples,), as a call has one: velocities in the motion's unit per second, and
+            accelerations in the motion's unit per second squared. Both belong to the same moments.
+
+        Raises:
+            TypeError: as of a call.
+            ValueError: as of a call; and if the estimator has no acceleration, with those that have.
+        """
+        check_accelerated(self.spec.estimator)
+        velocity, acceleration = self._taken(times_s, counts, until_s, Motions)
+        return velocity, acceleration
+
+    def _taken(
+        self,
+        times_s: ArrayLike,
+        counts: ArrayLike,
+        until_s: ArrayLike | None,
+        kind: type[Velocities] | type[Motions],
+    ) -> tuple[np.ndarray, ...]:
+        """Return the outputs of a kind for the samples that further edges complete."""
         known = len(self._last[0])
         times = times_of(times_s, self._last[0] if known else None)
         array = checks.integers("counts", counts)
@@ -176,9 +210,11 @@ class EdgeVelocityEstimator:
         if not len(times):
             if until_s is not None:
                 raise ValueError("until_s needs the time and the count of the start first")
-            return np.zeros(0)
+            return kind(*(np.zeros(0) for _ in kind._fields))
         check_edges(times, array, known)
-        return self._advance(times, array, self._end(times, until_s), known)
+        first = self._samples
+        self._advance(times, array, self._end(times, until_s), known)
+        return self._outputs(first, kind)
 
     def _end(self, times: np.ndarray, until_s: ArrayLike | None) -> np.ndarray:
         """Return the time up to which all edges are given, shape (1,)."""
@@ -191,8 +227,8 @@ class EdgeVelocityEstimator:
             raise ValueError(f"until_s must be {times[-1]} or later, the last time that was given, not {end}")
         return end[None]
 
-    def _advance(self, times: np.ndarray, counts: np.ndarray, end: np.ndarray, known: int) -> np.ndarray:
-        """Take edges behind the first of `times`, which is known; return the velocities up to `end`."""
+    def _advance(self, times: np.ndarray, counts: np.ndarray, end: np.ndarray, known: int) -> None:
+        """Let edges wait behind the first of `times`, which is known, and samples up to `end` be complete."""
         rate, per_sample = self._time.sample_hz, self.spec.clocks_per_sample
         start, origin = self._start or (times[0], int(counts[0]))
         clocks = clocks_of(since(start, times), rate, per_sample, self._clock, known)
@@ -203,23 +239,23 @@ class EdgeVelocityEstimator:
         # Nothing is refused from here on.
         self._start, self._last, self._clock = (start, origin), (end, counts[-1:]), int(clocks[-1])
         self._waiting.append(edges)
-        return self._velocities(samples)
+        self._samples = samples
 
-    def _velocities(self, samples: int) -> np.ndarray:
-        """Take so many samples in all; return their velocities, without sample 0."""
-        first, self._samples = self._samples, samples
-        if samples == first:
-            return np.zeros(0)
-        design = self.spec.design
-        waiting = self._waiting
-        edges = (
-            waiting[0] if len(waiting) == 1 else Edges(*(np.concatenate(each) for each in zip(*waiting, strict=True)))
-        )
-        velocity = np.zeros(samples - first, np.float64 if self._floating else np.int64)
-        params = controller(self._axis, 0)[0]
-        self._state, taken = run(params, self._state, design.timing, edges, first, velocity)
-        self._waiting = [Edges(edges.clocks[taken:], edges.levels[taken:])]
-        return velocity[int(first == 0) :] * self._unit
+    def _outputs(self, first: int, kind: type[Velocities] | type[Motions]) -> Velocities | Motions:
+        """Take the samples from `first` on that are complete; return their outputs of a kind, without sample 0."""
+        number = np.float64 if self._floating else np.int64
+        made = kind(*(np.zeros(self._samples - first, number) for _ in kind._fields))
+        if self._samples > first:
+            waiting = self._waiting
+            edges = (
+                waiting[0]
+                if len(waiting) == 1
+                else Edges(*(np.concatenate(each) for each in zip(*waiting, strict=True)))
+            )
+            params = controller(self._axis, 0)[0]
+            self._state, taken = run(params, self._state, self.spec.design.timing, edges, first, made)
+            self._waiting = [Edges(edges.clocks[taken:], edges.levels[taken:])]
+        return kind(*(part[int(first == 0) :] * unit for part, unit in zip(made, self._units, strict=False)))
 
 
 def default_clock_hz(sample_hz: float) -> float:

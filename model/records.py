@@ -1,4 +1,4 @@
-"""A velocity in one call: records of counts, or of edges with their times, through an estimator of the hardware."""
+"""A velocity in one call, alone or with the acceleration: records of counts, or of edges, through an estimator."""
 
 import warnings
 from typing import Any
@@ -12,7 +12,7 @@ from .edge_times import check_edges, samples_of, since, times_of
 from .edge_velocity_estimator import EdgeVelocityEstimator, default_clock_hz
 from .motion import Motion
 from .record_time import RecordTime
-from .velocity_estimator import VelocityEstimator, check_of_counts, is_floating, output_of
+from .velocity_estimator import VelocityEstimator, check_accelerated, check_of_counts, is_floating, output_of
 
 BOUNDS = "speed_max", "travel", "jerk_max", "edge_error"
 """The bounds of a motion that are settings."""
@@ -39,7 +39,8 @@ def velocity(
         velocity(counts, 10e3, count=1e-6)               # m/s, of counts of 1 um at 10 kHz
 
     Causal, if the bounds are given: a velocity then depends on the counts up to its sample. An estimator starts at 0
-    and takes some time to settle. `VelocityEstimator` takes a record in pieces.
+    and takes some time to settle. `VelocityEstimator` takes a record in pieces. `velocity_and_acceleration` has the
+    acceleration, too.
 
     Args:
         counts: integers, shape (..., samples), with two samples or more along `axis`; other axes are lanes of one
@@ -67,22 +68,32 @@ def velocity(
         TypeError: if an argument is of the wrong type.
         ValueError: if a name is unknown, a value is out of range, or there are fewer than two samples.
     """
-    array = np.moveaxis(checks.integers("counts", counts), axis, -1)
-    if array.shape[-1] < 2:
-        raise ValueError(f"counts must have two samples or more along axis {axis}, not {array.shape[-1]}")
-    if not array.size:
-        return np.zeros(np.shape(counts))
-    is_floating(backend)
-    check_of_counts(estimator)
-    output_of(estimator, output)
-    modulus = modulus_of(settings.pop("count_bits", None), settings.pop("count_modulus", None))
-    check_span(array, modulus)
-    whole = unwrapped(array, modulus)
-    motion, found = _motion(whole, sample_hz, count, acceleration_max, settings)
-    taken = VelocityEstimator(sample_hz, estimator, motion, output, backend, **settings)
-    made = taken(np.moveaxis(whole, -1, axis), axis)
-    _tell(found, taken.flags, cure(int(np.abs(np.diff(whole)).max())))
-    return made
+    how = {"count": count, "acceleration_max": acceleration_max, "output": output, "backend": backend, "axis": axis}
+    return _of_counts(False, counts, sample_hz, estimator, how | settings)[0]
+
+
+def velocity_and_acceleration(
+    counts: ArrayLike, sample_hz: float, estimator: str = "kalman", **settings: Any
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the velocity and the acceleration at every sample of an encoder's counts, as the hardware estimates them.
+
+        v, a = velocity_and_acceleration(counts, 10e3, count=1e-6)        # m/s and m/s^2
+
+    Args:
+        counts, sample_hz: as of `velocity`.
+        estimator: name of an estimator that has an acceleration and needs only counts.
+        settings: the other arguments of `velocity`, and its settings.
+
+    Returns:
+        Two arrays in the shape that `velocity` returns, in the unit of `count` per second, and per second squared. Both
+        belong to the same moments.
+
+    Warns, Raises:
+        As `velocity`; ValueError also if the estimator has no acceleration, with those that have.
+    """
+    check_accelerated(estimator)
+    velocities, accelerations = _of_counts(True, counts, sample_hz, estimator, settings)
+    return velocities, accelerations
 
 
 def velocity_of_edges(
@@ -99,7 +110,7 @@ def velocity_of_edges(
     """Return the velocity at `sample_hz` from the times of an encoder's edges, as the hardware estimates it.
 
     Edges that are more than a second apart, and more than 1024 samples, may read as standstill, as in hardware.
-    `EdgeVelocityEstimator` takes a record in pieces.
+    `EdgeVelocityEstimator` takes a record in pieces. `velocity_and_acceleration_of_edges` has the acceleration, too.
 
     Args:
         times_s: s, shape (edges,), increasing: the start of the record, and the time of every edge. Integers (whole
@@ -120,6 +131,77 @@ def velocity_of_edges(
         As `velocity`; ValueError also if times do not increase, a count changes by another number than 1, or edges
         come faster than the clock.
     """
+    how = {"count": count, "acceleration_max": acceleration_max, "output": output, "backend": backend}
+    return _of_edges(False, times_s, counts, sample_hz, estimator, how | settings)[0]
+
+
+def velocity_and_acceleration_of_edges(
+    times_s: ArrayLike, counts: ArrayLike, sample_hz: float, estimator: str = "edge-kalman", **settings: Any
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the velocity and the acceleration at `sample_hz` from the times of an encoder's edges.
+
+    Args:
+        times_s, counts, sample_hz: as of `velocity_of_edges`.
+        estimator: name of an estimator that has an acceleration.
+        settings: the other arguments of `velocity_of_edges`, and its settings.
+
+    Returns:
+        Two arrays in the shape that `velocity_of_edges` returns, in the unit of `count` per second, and per second
+        squared. Both belong to the same moments.
+
+    Warns, Raises:
+        As `velocity_of_edges`; ValueError also if the estimator has no acceleration, with those that have.
+    """
+    check_accelerated(estimator)
+    velocities, accelerations = _of_edges(True, times_s, counts, sample_hz, estimator, settings)
+    return velocities, accelerations
+
+
+def _of_counts(
+    both: bool, counts: ArrayLike, sample_hz: float, estimator: str, settings: dict[str, Any]
+) -> tuple[np.ndarray, ...]:
+    """Return the velocities of a record of counts; with `both` the accelerations, too.
+
+    Args:
+        both: whether the accelerations are wanted.
+        counts, sample_hz, estimator: as of `velocity`.
+        settings: all other arguments of `velocity`, and its settings; those that are not given have its defaults.
+    """
+    left: dict[str, Any] = {"count": 1.0, "acceleration_max": None, "output": None, "backend": "fixed", "axis": -1}
+    left |= settings
+    axis, output, backend = left.pop("axis"), left.pop("output"), left.pop("backend")
+    array = np.moveaxis(checks.integers("counts", counts), axis, -1)
+    if array.shape[-1] < 2:
+        raise ValueError(f"counts must have two samples or more along axis {axis}, not {array.shape[-1]}")
+    if not array.size:
+        return np.zeros(np.shape(counts)), np.zeros(np.shape(counts))
+    is_floating(backend)
+    check_of_counts(estimator)
+    output_of(estimator, output)
+    modulus = modulus_of(left.pop("count_bits", None), left.pop("count_modulus", None))
+    check_span(array, modulus)
+    whole = unwrapped(array, modulus)
+    motion, found = _motion(whole, sample_hz, left.pop("count"), left.pop("acceleration_max"), left)
+    taken = VelocityEstimator(sample_hz, estimator, motion, output, backend, **left)
+    moved = np.moveaxis(whole, -1, axis)
+    made = taken.with_acceleration(moved, axis) if both else (taken(moved, axis),)
+    _tell(found, taken.flags, cure(int(np.abs(np.diff(whole)).max())))
+    return made
+
+
+def _of_edges(
+    both: bool, times_s: ArrayLike, counts: ArrayLike, sample_hz: float, estimator: str, settings: dict[str, Any]
+) -> tuple[np.ndarray, ...]:
+    """Return the velocities of a record of edges; with `both` the accelerations, too.
+
+    Args:
+        both: whether the accelerations are wanted.
+        times_s, counts, sample_hz, estimator: as of `velocity_of_edges`.
+        settings: all other arguments of `velocity_of_edges`, and its settings; those that are not given have its
+            defaults.
+    """
+    left: dict[str, Any] = {"count": 1.0, "acceleration_max": None, "output": None, "backend": "fixed"} | settings
+    output, backend = left.pop("output"), left.pop("backend")
     RecordTime(sample_hz)
     times, array = times_of(times_s), checks.integers("counts", counts)
     if times.ndim != 1 or times.shape != array.shape or len(times) < 2:
@@ -128,12 +210,13 @@ def velocity_of_edges(
         )
     check_edges(times, array)
     passed = since(times[0], times)
-    clock_hz, gains = settings.pop("clock_hz", None), settings.pop("gains", None)
+    clock_hz, gains = left.pop("clock_hz", None), left.pop("gains", None)
     if clock_hz is None:
         clock_hz = max(default_clock_hz(sample_hz), 1 / np.diff(passed.since_s).min())
-    motion, found = _motion(samples_of(passed, array, sample_hz), sample_hz, count, acceleration_max, settings)
-    taken = EdgeVelocityEstimator(sample_hz, estimator, motion, output, backend, gains, clock_hz, **settings)
-    made = taken(times, array)
+    seen = samples_of(passed, array, sample_hz)
+    motion, found = _motion(seen, sample_hz, left.pop("count"), left.pop("acceleration_max"), left)
+    taken = EdgeVelocityEstimator(sample_hz, estimator, motion, output, backend, gains, clock_hz, **left)
+    made = taken.with_acceleration(times, array) if both else (taken(times, array),)
     _tell(found, taken.flags)
     return made
 
@@ -148,10 +231,10 @@ def _motion(
 
 
 def _tell(found: dict[str, float], flags: list[str], hint: str = "") -> None:
-    """Warn the caller's caller of bounds that come from the record, and of flags."""
+    """Warn the user, who is three calls up, of bounds that come from the record, and of flags."""
     if found:
         said = ", ".join(f"{name}={value:.6g}" for name, value in found.items())
-        warnings.warn(f"{said}: taken from the record, because not given{hint}", RecordWarning, stacklevel=3)
+        warnings.warn(f"{said}: taken from the record, because not given{hint}", RecordWarning, stacklevel=4)
     if flags:
         cures = "; a larger speed_max may help" if "velocity_saturated" in flags else ""
-        warnings.warn(f"raised flags: {', '.join(flags)}{cures}{hint}", RecordWarning, stacklevel=3)
+        warnings.warn(f"raised flags: {', '.join(flags)}{cures}{hint}", RecordWarning, stacklevel=4)

@@ -9,7 +9,8 @@ from . import checks
 from .counter import check_span, cure, modulus_of, unwrapped
 from .encoder.quadrature import seen_count
 from .estimators import registry
-from .estimators.estimate import EstimatorGains, estimate
+from .estimators.acceleration import Accelerated, Motions, Velocities, keep
+from .estimators.estimate import EstimatorDesign, EstimatorGains, estimate
 from .motion import Motion
 from .record_axis import axis_of
 from .record_time import RecordTime
@@ -20,11 +21,12 @@ BACKENDS = "fixed", "float"
 
 
 @compiled
-def run(params: tuple, state: tuple, counts: np.ndarray, velocity: np.ndarray) -> tuple[tuple, int]:
-    """Fill `velocity` with the words of a record of counts; return the state and the flags that were raised."""
+def run(params: tuple, state: tuple, counts: np.ndarray, made: Velocities | Motions) -> tuple[tuple, int]:
+    """Fill `made` with the words of a record of counts; return the state and the flags that were raised."""
     flags = 0
     for k in range(len(counts)):
-        state, velocity[k], raised = estimate(params, state, seen_count(counts[k]), 0)
+        state, velocity, raised = estimate(params, state, seen_count(counts[k]), 0)
+        keep(made, k, velocity, params, state)
         flags |= raised
     return state, flags
 
@@ -58,6 +60,29 @@ def check_of_counts(estimator: str) -> None:
         raise checks.FieldError(
             "estimator", f"must be one that needs only counts, not {estimator!r}: velocity_of_edges takes the edges"
         )
+
+
+def check_accelerated(estimator: str) -> None:
+    """Raise ValueError if there is no such estimator, or it has no acceleration."""
+    if not issubclass(registry.design_of(estimator), Accelerated):
+        names = [name for name, kind in registry.ESTIMATORS.items() if issubclass(kind, Accelerated)]
+        raise checks.FieldError(
+            "estimator", f"must be one with an acceleration ({', '.join(names)}), not {checks.shown(estimator)}"
+        )
+
+
+def units_of(design: EstimatorDesign, floating: bool, count: float, sample_hz: float) -> tuple[float, ...]:
+    """Return what one of a velocity's word is worth, unit/s, and one of the acceleration's, unit/s^2, if there is one.
+
+    Args:
+        design: the design of the estimator.
+        floating: whether the outputs are float64, in counts and samples.
+        count: size of a count, in the unit.
+        sample_hz: sample rate, Hz.
+    """
+    formats = design.velocity, *((design.acceleration,) if isinstance(design, Accelerated) else ())
+    lsbs = (1.0 if floating else fmt.lsb for fmt in formats)
+    return tuple(lsb * count * sample_hz**power for power, lsb in enumerate(lsbs, 1))
 
 
 class VelocityEstimator:
@@ -109,8 +134,7 @@ class VelocityEstimator:
         self.spec = axis_of(motion, self._time, estimator, gains)
         self._design = self.spec.design.estimator
         self.words = self._time.words(word for word in self._design.words if word.name != self._design.output_word())
-        lsb = 1.0 if self._floating else self._design.velocity.lsb
-        self._unit = lsb * motion.count * sample_hz
+        self._units = units_of(self._design, self._floating, motion.count, sample_hz)
         self._settings: dict[str, np.ndarray] = {}
         self.reset()
         self.set(**settings)
@@ -165,20 +189,45 @@ class VelocityEstimator:
             TypeError: if the counts are not integers.
             ValueError: if the counts have no axis of time, or other lanes than before, or jump.
         """
+        (velocity,) = self._taken(counts, axis, Velocities)
+        return velocity
+
+    def with_acceleration(self, counts: ArrayLike, axis: int = -1) -> tuple[np.ndarray, np.ndarray]:
+        """Return the velocities and the accelerations at further counts; pieces may also be taken in turns with calls.
+
+        Args:
+            counts, axis: as of a call.
+
+        Returns:
+            Two arrays in the shape that a call returns: velocities in the motion's unit per second, and accelerations
+            in the motion's unit per second squared. Both belong to the same moments.
+
+        Raises:
+            TypeError: as of a call.
+            ValueError: as of a call; and if the estimator has no acceleration, with those that have.
+        """
+        check_accelerated(self.spec.estimator)
+        velocity, acceleration = self._taken(counts, axis, Motions)
+        return velocity, acceleration
+
+    def _taken(self, counts: ArrayLike, axis: int, kind: type[Velocities] | type[Motions]) -> tuple[np.ndarray, ...]:
+        """Return the outputs of a kind at further counts."""
         counts = np.moveaxis(checks.integers("counts", counts), axis, -1)
         shape = self._lanes(counts.shape[:-1])
         lanes = np.broadcast_to(counts, (*shape, counts.shape[-1]))
-        made = np.zeros(lanes.shape, np.float64)
+        made = kind(*(np.zeros(lanes.shape, np.float64) for _ in kind._fields))
         if lanes.size:
             words = self._in_range(lanes.reshape(-1, lanes.shape[-1]), shape)
             if not self._states:
                 self._states = [self._design.start(self._floating) for _ in words]
             for lane, (row, params) in enumerate(zip(words, self._params(shape), strict=True)):
-                velocity = np.zeros(len(row), np.float64 if self._floating else np.int64)
-                self._states[lane], raised = run(params, self._states[lane], row, velocity)
+                number = np.float64 if self._floating else np.int64
+                words_made = kind(*(np.zeros(len(row), number) for _ in kind._fields))
+                self._states[lane], raised = run(params, self._states[lane], row, words_made)
                 self._flags |= int(raised)
-                made[np.unravel_index(lane, shape) if shape else ()] = velocity * self._unit
-        return np.moveaxis(made, -1, axis)
+                for whole, part, unit in zip(made, words_made, self._units, strict=False):
+                    whole[np.unravel_index(lane, shape) if shape else ()] = part * unit
+        return tuple(np.moveaxis(each, -1, axis) for each in made)
 
     def _lanes(self, shape: tuple[int, ...]) -> tuple[int, ...]:
         """Return the shape of the lanes of counts and settings together, which is the same in all pieces."""

@@ -16,6 +16,7 @@ class UnknownError(Exception):
 VIEWS: dict[str, Callable[..., list[str]]] = {
     "situations": accuracy.situations,
     "encoders": accuracy.encoders,
+    "accelerations": accuracy.accelerations,
     "learned": accuracy.learned,
     "published": accuracy.published,
     "frontier": accuracy.frontier,

@@ -48,6 +48,23 @@ def situations(report: Report) -> list[str]:
     return table(["RMS error (mm/s)", *MOTIONS.values(), "delay at the impact (µs)"], rows)
 
 
+def accelerations(report: Report) -> list[str]:
+    """Return the RMS error of every estimator's acceleration on swing and impact, the least bold."""
+    signals = ("paper", "hit")
+    found: dict[str, dict[str, float]] = {}
+    for row in report["rows"]:
+        found.setdefault(f"`{row['estimator']}`", {})[row["signal"]] = row["acceleration_rms_mm_s2"] / 1e3
+    true = {row["signal"]: row["true_acceleration_rms_mm_s2"] / 1e3 for row in report["rows"]}
+    least = {signal: min(own[signal] for own in found.values()) for signal in signals}
+
+    def cell(error: float, signal: str) -> str:
+        return f"**{number(error, 2)}**" if error == least[signal] else number(error, 2)
+
+    rows = [[name, *(cell(own[signal], signal) for signal in signals)] for name, own in found.items()]
+    heads = (f"{MOTIONS[signal]}, of {number(true[signal], 2)}" for signal in signals)
+    return table(["RMS error of the acceleration (m/s²)", *heads], rows)
+
+
 def _small(error_mm_s: float) -> str:
     """Return an error; less than a ten-thousandth of a mm/s is none."""
     return number(error_mm_s, 2) if error_mm_s >= 1e-4 else "0"

@@ -8,7 +8,7 @@ from hardwall.model.estimators.count_kalman import Filter as FilterDesign
 
 from ..arithmetic.fixed import saturate
 from . import edge_kalman
-from .estimate import EstimatorBlock
+from .acceleration import AcceleratedBlock
 
 
 class Filter(edge_kalman.Estimator):
@@ -28,14 +28,14 @@ class Filter(edge_kalman.Estimator):
         m.d.comb += s.bursts.eq(self.limited)
 
 
-class Estimator(EstimatorBlock):
+class Estimator(AcceleratedBlock):
     """Position, velocity and acceleration, corrected when the count changes.
 
     Equation, with f the count, k the number of the sample, d the difference of f from the last sample:
 
         d          limited to the largest difference
         d != 0     an edge at the time 2 k - 1 if d is 1 or -1, else 2 k, in halves of a sample
-        velocity   that of `edge_kalman` for this edge, at the time 2 k
+        outputs    those of `edge_kalman` for this edge, at the time 2 k
 
     Start: at the first sample, and with `restart`, everything is forgotten; v = 0 until the second edge.
 
@@ -86,6 +86,7 @@ class Estimator(EstimatorBlock):
             seen.down.eq(down),
             seen.run.eq(1),
             self.velocity.eq(core.velocity),
+            self.acceleration.eq(core.acceleration),
             self.saturated.eq(core.saturated.any()),
             self.valid.eq(core.valid),
         ]

@@ -19,14 +19,14 @@ from hardwall.model.estimators.edge_kalman_design import (
 
 from ..arithmetic.fixed import fitted, length_of, saturate, shift_floor, shift_round_half_up
 from ..encoder.scale_map import ScaleMap
+from .acceleration import AcceleratedBlock
 from .edge_kalman_signals import LIMB_BITS, Signals
-from .estimate import EstimatorBlock
 
-HIGH = "TURN HIGH", "TRAVEL HIGH", "MEAN HIGH", "PLACE HIGH", "VELOCITY HIGH", "BEND HIGH", "LINE HIGH"
+HIGH = "TURN HIGH", "TRAVEL HIGH", "MEAN HIGH", "PLACE HIGH", "VELOCITY HIGH", "BEND HIGH", "LINE HIGH", "LINE TURN"
 """The states in which the multiplier takes the rest."""
 
 
-class Estimator(EstimatorBlock):
+class Estimator(AcceleratedBlock):
     """Position, velocity and acceleration at the last edge, corrected at every edge by gains for the time between them.
 
     Equation, with D clocks a sample, T clocks and n counts from the last edge to this one, s clocks since this edge:
@@ -37,18 +37,19 @@ class Estimator(EstimatorBlock):
                          x <- K_x r - r,  v <- v + a T + K_v r,  a <- a + K_a r
         at every sample  line = v + a s, held within the bound for no further edge
 
-    with the gains and bounds of the table's row for T and the memory; the velocity is the line. Start: at the first
-    sample, and with `restart`, everything is forgotten; v = 0 until the second edge.
+    with the gains and bounds of the table's row for T and the memory. The velocity is the line. The acceleration is
+    a D, and 0 at rest. Start: at the first sample, and with `restart`, everything is forgotten; v = 0 until the second
+    edge.
 
     With a map of the scale (`design.scale`) n is the difference of the places of the two edges: their numbers, each
     with the error that the map has for it.
 
     Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`. One multiplier makes
-    all seven products, each in two halves: the right operand is wider than a multiplier of the part.
+    all eight products, each in two halves: the right operand is wider than a multiplier of the part.
 
     Rounding and overflow: the values that a product corrects are rounded half up; the change of velocity, the mean and
-    the bound are rounded down, and so the line half up. Velocities and the error of the place saturate, with flags; the
-    acceleration saturates, which is its limit. Count and stamp may wrap.
+    the bound are rounded down, and so the line half up; a D is rounded down. Velocities and the error of the place
+    saturate, with flags; the acceleration saturates, which is its limit. Count and stamp may wrap.
 
     Parameters
     ----------
@@ -69,7 +70,7 @@ class Estimator(EstimatorBlock):
 
     @staticmethod
     def members(design: Design) -> dict[str, Member]:
-        own = EstimatorBlock.members(design)
+        own = AcceleratedBlock.members(design)
         if design.scale is None:
             return own
         of_map = {f"map_{name}": member for name, member in ScaleMap.members(design.scale).items()}
@@ -230,10 +231,11 @@ class Estimator(EstimatorBlock):
         return {
             "LINE": [s.left.eq(s.a), s.right.eq(s.age), s.room.eq(Mux(s.v < 0, s.bound + s.v, s.bound - s.v))],
             "LINE LOW": [s.least.eq(Mux(s.v < 0, -onward, -s.v)), s.most.eq(Mux(s.v < 0, -s.v, onward))],
-            "LINE HIGH": [s.waits(0)],
+            # The product of a and the units of a sample follows, in which the multiplier has nothing else to do.
+            "LINE HIGH": [s.waits(0), s.right.eq(p.per_sample)],
             "LINE SUM": [s.summed],
-            "LINE TURN": [s.turned],
-            "STRAIGHT": [s.straight.eq(s.v + s.turn)],
+            "LINE TURN": [s.turned, s.waits(0)],
+            "STRAIGHT": [s.straight.eq(s.v + s.turn), s.summed],
             "LIMIT": [s.line.eq(limited), s.far_line.eq(limited != s.straight)],
             "HOLD": [
                 s.held.eq(Mux(s.doubt != 0, s.line, held)),
@@ -241,6 +243,7 @@ class Estimator(EstimatorBlock):
             ],
             "OUTPUT": [
                 self.velocity.eq(Mux(s.rest, 0, shift_round_half_up(s.held, GUARD_BITS))),
+                self.acceleration.eq(Mux(s.rest, 0, s.total >> p.sample_shift)),
                 self.saturated.eq(Cat(s.flags[0], s.flags[1] | s.far_line & ~s.rest, s.bursts)),
                 self.valid.eq(1),
             ],

@@ -25,7 +25,7 @@ class Signals:
         self.bound, self.doubt = Signal(d.motion.width), Signal(range(d.doubt + 1))
         self.level = Signal(range(TOP + 1))
         self.place, self.mean = Signal(error), Signal(error)
-        self.v, self.a = Signal(motion), Signal(shape(d.acceleration))
+        self.v, self.a = Signal(motion), Signal(shape(d.a))
         states = self.place, self.mean, self.v, self.a, self.doubt
         self.forgotten = [self.level.eq(TOP), *(state.eq(0) for state in states)]
 
@@ -43,7 +43,7 @@ class Signals:
 
         # The multiplier: the low limb's product waits, with half of what is rounded off, for the high limb's.
         wide = max(d.time_bits, *(fmt.width for fmt in d.columns))
-        self.left = Signal(signed(max(d.motion.width + 1, d.acceleration.width, d.error.width + 1)))
+        self.left = Signal(signed(max(d.motion.width + 1, d.a.width, d.error.width + 1)))
         self.right, self.limb = Signal(wide), Signal(max(LIMB_BITS, wide - LIMB_BITS))
         self.product = Signal(signed(len(self.left) + len(self.limb)))
         self.low = Signal(signed(max(len(self.product), len(self.left) + wide - 1) + 1))
@@ -67,7 +67,7 @@ class Signals:
         self.r = Signal(error)
         self.lower, self.alarm = Signal.like(self.level), Signal()
         self.far_v = Signal(signed(max(len(self.ahead), self._shifted(p.velocity_shift)) + 1))
-        self.bent = Signal(signed(max(d.acceleration.width, self._shifted(p.bend_shift)) + 1))
+        self.bent = Signal(signed(max(d.a.width, self._shifted(p.bend_shift)) + 1))
 
         # The line, and the bound on it without a further edge.
         self.room, self.fastest = Signal(signed(d.motion.width + 1)), Signal(d.motion.width)

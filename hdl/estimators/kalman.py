@@ -5,10 +5,10 @@ from amaranth.hdl import Module, Signal, signed
 from hardwall.model.estimators.kalman import Design
 
 from ..arithmetic.fixed import saturate, shape, shift_floor, shift_round_half_up
-from .estimate import EstimatorBlock
+from .acceleration import AcceleratedBlock
 
 
-class Estimator(EstimatorBlock):
+class Estimator(AcceleratedBlock):
     """Position, velocity and acceleration tracked with constant gains, one sample at a time.
 
     Equation, per sample, in counts and sample periods:
@@ -17,12 +17,12 @@ class Estimator(EstimatorBlock):
         r  = count - x
         x <- x + K_x r,  v <- v + K_v r,  a <- a + K_a r        a = 0 while K_a = 0
 
-    The velocity is v. Start: at the first sample, and with `restart`, x = count, v = 0 and a = 0.
+    The velocity is v, the acceleration a. Start: at the first sample, and with `restart`, x = count, v = 0 and a = 0.
 
     Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`. One multiplier makes
     the three products.
 
-    Rounding and overflow: r, the products and narrowed sums round down, the velocity half up. The difference of counts,
+    Rounding and overflow: r, the products and narrowed sums round down, the outputs half up. The difference of counts,
     x - count, v and a saturate, with flags. x - count, v and a saturate only with gains that belong to no noise model.
     The count may wrap.
 
@@ -80,17 +80,25 @@ class Estimator(EstimatorBlock):
             "LIMIT LEAD": [lead.eq(held), self.saturated[1].eq(held != distance)],
             "INNOVATION": [
                 operand.eq(-lead >> (design.lead.f - design.operand.f)),
-                gain.eq(self.kalman_position),
+                gain.eq(self.kalman_velocity),
             ],
-            "POSITION": [gain.eq(self.kalman_velocity)],
-            "VELOCITY": [scaled(for_x), gain.eq(self.kalman_acceleration)],
-            "CORRECT POSITION": [lead.eq(lead + term), scaled(for_v)],
+            "VELOCITY": [gain.eq(self.kalman_acceleration)],
+            "ACCELERATION": [scaled(for_v), gain.eq(self.kalman_position)],
             "CORRECT VELOCITY": [total.eq(predicted + term), scaled(for_a)],
-            "LIMIT VELOCITY": [v.eq(held_v), self.saturated[2].eq(held_v != total), total.eq(a + term)],
-            "OUTPUT": [
+            "LIMIT VELOCITY": [
+                v.eq(held_v),
+                self.saturated[2].eq(held_v != total),
+                total.eq(a + term),
+                scaled(for_x),
+            ],
+            "LIMIT ACCELERATION": [
                 a.eq(held_a),
                 self.saturated[2].eq(self.saturated[2] | (held_a != total)),
+                lead.eq(lead + term),
+            ],
+            "OUTPUT": [
                 self.velocity.eq(shift_round_half_up(v, design.v.f - velocity.f)),
+                self.acceleration.eq(shift_round_half_up(a, design.a.f - design.acceleration.f)),
                 self.valid.eq(1),
             ],
         }

@@ -10,11 +10,11 @@ from hardwall.model.estimators.levant_edge_design import QUOTIENT_BITS
 from ..arithmetic.divide import Divide
 from ..arithmetic.fixed import at_most, fitted, length_of, shift_floor, shift_round_half_up
 from ..arithmetic.sqrt import Sqrt
-from .estimate import EstimatorBlock
+from .acceleration import AcceleratedBlock
 from .levant_edge_signals import Signals
 
 
-class Estimator(EstimatorBlock):
+class Estimator(AcceleratedBlock):
     """Levant's differentiator on edges: the error is taken at an edge, against the place predicted for it.
 
     Equation, in counts, samples and clocks; an edge comes T clocks and n edges after the last edge in use, with
@@ -25,8 +25,8 @@ class Estimator(EstimatorBlock):
         a <- a - min(change of v / 2**L, alpha 2**L) sign(E)
 
     (where |E| >= D, without the limit by lambda); and at every sample, s clocks after that edge, velocity = v + a s,
-    held within the bound for no further edge; 0 at rest. The places of the four edges of a cycle are learnt from E.
-    `hardwall.model.estimators.levant_edge` has the whole law.
+    held within the bound for no further edge; 0 at rest. The acceleration is a D, and 0 at rest. The places of the four
+    edges of a cycle are learnt from E. `hardwall.model.estimators.levant_edge` has the whole law.
 
     Start: at the first sample, and with `restart`, v = a = 0 and no edge is known; the first edge to come is the
     anchor, the second gives a velocity.
@@ -252,7 +252,7 @@ class Estimator(EstimatorBlock):
         with m.State("UPDATE"):
             far_v = s.ahead - s.change
             v = fitted(far_v, d.velocity.width)
-            a = fitted(s.a - s.bend, d.acceleration.width)
+            a = fitted(s.a - s.bend, d.a.width)
             m.d.sync += [
                 s.v.eq(v),
                 s.a.eq(a),
@@ -276,6 +276,8 @@ class Estimator(EstimatorBlock):
             m.d.sync += [
                 s.onward.eq(Mux(s.room < 0, 0, s.room)),
                 s.refuted.eq(s.correct & goes_on & (_size(s.v) > s.fastest)),
+                # From the state after the next one on, the product is the acceleration of the output.
+                s.right.eq(d.clocks),
             ]
             m.next = "LINE TURN"
         with m.State("LINE TURN"):
@@ -302,6 +304,7 @@ class Estimator(EstimatorBlock):
                 m.d.sync += [s.v.eq(0), s.a.eq(0)]
             m.d.sync += [
                 self.velocity.eq(Mux(s.rest, 0, held)),
+                self.acceleration.eq(Mux(s.rest, 0, s.product >> s.params.sample_shift)),
                 self.saturated.eq(Cat(s.flags[0], s.flags[1] | s.far_line & ~s.rest, s.bursts)),
                 self.valid.eq(1),
             ]

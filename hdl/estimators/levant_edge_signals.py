@@ -18,7 +18,7 @@ class Signals:
         self.running, self.known = Signal(), Signal()
         self.number, self.stamp, self.kind = Signal(count), Signal(clocks), Signal(2)
         self.length = Signal(range(d.stamp_width + 1))
-        self.v, self.a = Signal(velocity), Signal(shape(d.acceleration))
+        self.v, self.a = Signal(velocity), Signal(shape(d.a))
         self.places = Array(Signal(shape(d.place), name=f"place_{n}") for n in range(4))
 
         # The sample. `anchor`: its edge is the new anchor; `loose`: its edge is too close to the anchor, and the
@@ -49,8 +49,8 @@ class Signals:
         self.start, self.solved, self.root = Signal(), Signal(), Signal(d.root.width)
         self.root_product = Signal(d.lambda_.width + d.root.width)
         self.slope, self.far_slope, self.limit = Signal(d.velocity.width - 1), Signal(), Signal(d.velocity.width - 1)
-        self.bent, self.relay = Signal(d.acceleration.width - 1), Signal(d.acceleration.width - 1)
-        self.change, self.bend = Signal(velocity), Signal(shape(d.acceleration))
+        self.bent, self.relay = Signal(d.a.width - 1), Signal(d.a.width - 1)
+        self.change, self.bend = Signal(velocity), Signal(shape(d.a))
         self.here, self.there = Signal(shape(d.place)), Signal(shape(d.place))
         self.next_here, self.next_there = Signal(shape(d.place)), Signal(shape(d.place))
 

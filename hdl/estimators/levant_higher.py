@@ -6,14 +6,14 @@ from amaranth.hdl import Cat, Const, Module, Mux, Signal, signed
 
 from hardwall.model.estimators.levant_higher_design import Design
 
-from ..arithmetic.fixed import fits, fitted, shape, shift_round_half_up
+from ..arithmetic.fixed import fits, fitted, shape, shift_floor, shift_round_half_up
 from ..arithmetic.powers import Powers
 from ..wires import port
-from .estimate import EstimatorBlock
+from .acceleration import AcceleratedBlock
 from .levant import arrive
 
 
-class Estimator(EstimatorBlock):
+class Estimator(AcceleratedBlock):
     """A differentiator of one of the four designs, one sample at a time.
 
     Equation, per sample, in counts and sample periods, with r = |e|^(1 / (N + 1)). The error e is z0 - count; with
@@ -25,13 +25,14 @@ class Estimator(EstimatorBlock):
         z2 <- z2 + z3               - ...
         z3 <- z3                    - c_0 sign(e)
 
-    Start: at the first sample, and with `restart`, z0 = count and all else is 0.
+    The velocity is z1, the acceleration z2. Start: at the first sample, and with `restart`, z0 = count and all else is
+    0.
 
     Latency: `latency` clocks from `strobe` to `valid`: one for the distance from the count, one for the magnitude of
     e, the powers' own, one for the sums. The next `strobe` may come with `valid`.
 
-    Rounding and overflow: the powers are rough, as derived; Taylor's terms round half up; saturations are flagged.
-    The count may wrap.
+    Rounding and overflow: the powers are rough, as derived; Taylor's terms and the velocity round half up, the
+    acceleration rounds down; saturations are flagged. The count may wrap.
 
     Parameters
     ----------
@@ -63,7 +64,10 @@ class Estimator(EstimatorBlock):
         sums = self._taylor(m, states, gap)
         corrections = [*self._terms(powers), Mux(still, 0, self._relay(m, octaves))]
 
-        m.d.comb += self.velocity.eq(z[0] >> design.z[0].f - design.velocity.f)
+        m.d.comb += [
+            self.velocity.eq(z[0] >> design.z[0].f - design.velocity.f),
+            self.acceleration.eq(shift_floor(z[1], design.z[1].f - design.acceleration.f)),
+        ]
         m.d.sync += [self.valid.eq(0), powers.start.eq(0)]
         with m.FSM():
             first = arrive(m, self, led, lead, design.gap.f, "MAGNITUDE")

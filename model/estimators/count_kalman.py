@@ -47,8 +47,9 @@ from ..encoder.quadrature import Seen
 from ..requirements import AxisRequirements
 from ..runtime.compiled import compiled
 from . import edge_kalman, edge_kalman_design
+from .acceleration import Accelerated, acceleration_of
 from .edge_kalman_design import Gains
-from .estimate import EstimatorDesign, estimate, largest_step
+from .estimate import estimate, largest_step
 
 UNITS = 2
 """Units of time in a sample."""
@@ -104,13 +105,13 @@ START = State(0, 0, 0, 0, 0, 0, edge_kalman_design.START)
 FLOAT_START = START._replace(filter=edge_kalman_design.FLOAT_START)
 
 
-class Design(EstimatorDesign):
+class Design(Accelerated):
     """Formats, table and latency for an axis, derived as the module says.
 
     Attributes:
         filter: the design of the filter, on an axis with a clock of `UNITS` clocks a sample.
         step_max: largest difference of counts.
-        velocity: format of the output.
+        velocity, acceleration: formats of the outputs, the filter's.
 
     Raises:
         ValueError: if the rates or ranges fit no format that int64 can hold, with the accepted range.
@@ -124,7 +125,8 @@ class Design(EstimatorDesign):
         super().__init__(axis, gains)
         known = {field.name: getattr(axis, field.name) for field in dataclasses.fields(AxisRequirements)}
         self.filter = Filter(AxisRequirements(**known | {"clock_hz": UNITS * axis.sample_hz}), gains)
-        self.velocity, self.step_max = self.filter.velocity, largest_step(axis)
+        self.velocity, self.acceleration = self.filter.velocity, self.filter.acceleration
+        self.step_max = largest_step(axis)
 
     @property
     def fastest(self) -> int:
@@ -181,3 +183,15 @@ def float_step(params, state, seen, restart):
     edge, after, _ = _edge(params, unlimited, state, seen, restart or not state.running)
     inner, velocity, _ = edge_kalman.float_step(params.filter, state.filter, edge, restart)
     return _with_filter(after, inner), velocity, 0
+
+
+@acceleration_of.register(Params)
+@compiled
+def acceleration(params, state):
+    return edge_kalman.acceleration(params.filter, state.filter)
+
+
+@acceleration_of.register(FloatParams)
+@compiled
+def float_acceleration(params, state):
+    return edge_kalman.float_acceleration(params.filter, state.filter)

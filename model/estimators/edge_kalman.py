@@ -37,6 +37,9 @@ an encoder if the axis is then faster than the last bound allows, and faster tha
 
 A turn needs no care: an edge has one place, whichever way it is crossed.
 
+The second output, the acceleration, is a: the slope of the line since the last edge, and 0 at rest. Where the bound
+holds the line in a silence, the output is still a.
+
 The scale. Where edges really stand may be known, by a map (`scale_map`): n is then the difference of the places of two
 edges. Without a map every edge is where its number says. The filter itself learns no places. It averages errors that
 repeat every four edges like any others, over the edges of a memory. A map is changed with `restart` only, because the
@@ -62,6 +65,7 @@ from ..arithmetic.fixed import length_of, saturate, shift_floor, shift_round_hal
 from ..encoder.quadrature import stamp_of
 from ..encoder.scale_map import FRACTION_BITS, place_of
 from ..runtime.compiled import compiled
+from .acceleration import acceleration_of
 from .bursts import NOTHING, watch
 from .edge_kalman_design import (
     ALARM_AT,
@@ -257,3 +261,15 @@ def float_step(params, state, seen, restart):
         known = int(known and not gone)
     after = State(1, known, number, stamp, bound, doubt, level, place, mean, velocity, acceleration, watched)
     return after, line, clumped << 2
+
+
+@acceleration_of.register(Params)
+@compiled
+def acceleration(params, state):
+    return shift_floor(state.acceleration * params.per_sample, params.sample_shift)
+
+
+@acceleration_of.register(FloatParams)
+@compiled
+def float_acceleration(params, state):
+    return state.acceleration * params.per_sample

@@ -34,8 +34,10 @@ Formats.
 - `error`, r, and the state's place x: edges times D. i holds the edges that twice the largest speed makes in two
   samples and two agile memories: a start in motion is caught up in this time. f is one more than the velocity's, less
   the bits of D: a place off by half an LSB at every edge is a velocity off by a quarter of the output's LSB.
-- `acceleration`, in counts a sample per unit: i holds 2**ACCELERATION_BITS C, f turns the velocity by a quarter of its
-  LSB over the longest memory.
+- `a`, in counts a sample per unit: i holds 2**ACCELERATION_BITS C, f turns the velocity by a quarter of its LSB over
+  the longest memory.
+- `acceleration`, the second output, in counts a sample^2: a D, rounded down. i holds the largest a, f resolves C to
+  2**-C_BITS. D has no more bits here than a time.
 - The next edge is at most 1 + m counts from the last one, m = ROOM s and at least LEAST_ROOM: ROOM s are 3.5 standard
   deviations of the difference of two edges' errors. The silence of `edge_kalman` has (2 + 2 m) D as its `bound`.
 - int64 holds every product: with a time of 26 bits motion has at most 35 and acceleration too, with a gain of 24 bits
@@ -55,8 +57,9 @@ from ..encoder import scale_map
 from ..encoder.quadrature import Seen
 from ..requirements import AxisRequirements
 from . import bursts
+from .acceleration import Accelerated
 from .bursts import Limits, Watch, doubt_samples
-from .estimate import EstimatorDesign, EstimatorGains
+from .estimate import EstimatorGains
 from .riccati import steady_state
 
 QUIET = 1.6
@@ -85,6 +88,8 @@ GUARD_BITS = 6
 """Bits of the state v below the output LSB."""
 ACCELERATION_BITS = 3
 """The acceleration may reach 2**ACCELERATION_BITS C."""
+C_BITS = 20
+"""The acceleration that is given out resolves C to 2**-C_BITS."""
 TIME_BITS = 27
 """The most bits of a stamp that are used; a time in use has one less."""
 MOTION_MAX, ERROR_MAX = 35, 38
@@ -133,6 +138,8 @@ class Params(NamedTuple):
     velocity_max: int
     acceleration_max: int
     output_shift: int
+    per_sample: int
+    sample_shift: int
     bound: int
     bound_max: int
     doubt: int
@@ -183,7 +190,7 @@ START = State(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, bursts.NOTHING)
 FLOAT_START = State(0, 0, 0, 0, 0.0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, bursts.NOTHING)
 
 
-class Design(EstimatorDesign):
+class Design(Accelerated):
     """Formats, tables and latency of the filter for an axis, derived as the module says.
 
     Args:
@@ -192,9 +199,11 @@ class Design(EstimatorDesign):
 
     Attributes:
         scale: the argument.
-        velocity, motion, acceleration, error: formats of the output, of v, of a, and of r and the place.
+        velocity, acceleration: formats of the outputs.
+        motion, a, error: formats of v, of a, and of r and the place.
         distance: format of the number of edges passed in an interval.
         unit, time_bits: log2 of the clocks in a unit of time, and the bits of a stamp in units.
+        per_sample, per_sample_f: the units in a sample as a word, and the fraction bits of the word.
         row_bits: bits of the part of a row's number that a time gives.
         columns: formats of the table's columns.
         table: the words, shape (rows, columns); a row's number is its level, then what the time gives.
@@ -287,7 +296,11 @@ class Design(EstimatorDesign):
 
         i = 1 + ACCELERATION_BITS + bits_for(bound * tau * self._unit_s / q)
         longest = bits_for(self.memories_s.max() / self._unit_s)
-        self.acceleration = SQ(i, max(min(self.velocity.f + 2 + longest, MOTION_MAX - i), 2 - i))
+        self.a = SQ(i, max(min(self.velocity.f + 2 + longest, MOTION_MAX - i), 2 - i))
+        cut = max(self.clocks.bit_length() - self.time_bits, 0)
+        self.per_sample, self.per_sample_f = self.clocks >> cut, self.unit - cut
+        finest = C_BITS - math.floor(math.log2(bound * tau**2 / q))
+        self.acceleration = SQ(i + bits_for(self._per_sample), min(finest, self.a.f + self.per_sample_f))
 
     def _agile_samples(self, axis: AxisRequirements) -> float:
         """Return the agile memory for an edge a sample, in samples."""
@@ -311,7 +324,7 @@ class Design(EstimatorDesign):
         self.table = np.stack(words, 1).astype(np.int64)
 
     def params(self, words: Mapping[str, int]) -> Params:
-        v, a, e = self.motion, self.acceleration, self.error
+        v, a, e = self.motion, self.a, self.error
         return Params(
             count_width=self.count_width,
             unit=self.unit,
@@ -329,6 +342,8 @@ class Design(EstimatorDesign):
             velocity_max=self.velocity.max << GUARD_BITS,
             acceleration_max=a.max,
             output_shift=GUARD_BITS,
+            per_sample=self.per_sample,
+            sample_shift=a.f + self.per_sample_f - self.acceleration.f,
             bound=math.floor(2 * self._apart * self._per_sample * 2.0**v.f),
             bound_max=2 * self.velocity.max << GUARD_BITS,
             doubt=self.doubt,
@@ -340,7 +355,7 @@ class Design(EstimatorDesign):
 
     def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
         """Return the float64 kernel's parameters: unrounded gains."""
-        steepest = 2.0 ** (self.acceleration.i - 1)
+        steepest = 2.0 ** (self.a.i - 1)
         return FloatParams(
             count_width=self.count_width,
             unit=self.unit,

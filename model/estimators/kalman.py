@@ -45,6 +45,9 @@ Formats, derived. C' = C tau^2 / q; 2**reach is at least 1/h and at least 1.
   ERROR_NORM 2**-GUARD_BITS of an LSB of the velocity, which is less than a half: *at constant n counts a sample the
   velocity, rounded half up, settles to n exactly*, to 0 at standstill. A limit cycle of the states may remain that no
   output shows.
+- `acceleration`, the second output: a, rounded half up, with `reach` bits more than the velocity, within 32 bits. The
+  floors add up to less than half an LSB of it, too: *at constant speed the acceleration settles to 0 exactly*. It has
+  one integer bit more than a, so that the largest a can be rounded.
 - The gain words are GAIN_BITS wide, in formats with HEADROOM_BITS above the designed gain. The exact settling holds for
   gains of the designed h, or of any larger h that the words hold; with others the last bits may move.
 - int64 holds 62 bits: if the formats do not fit, f is reduced.
@@ -76,7 +79,8 @@ from ..checks import FieldError
 from ..requirements import AxisRequirements
 from ..runtime.compiled import compiled
 from ..words import GAIN_BITS, Word, gain_format
-from .estimate import EstimatorDesign, EstimatorGains, estimate, fraction_bits, largest_step
+from .acceleration import WIDTH, Accelerated, acceleration_of
+from .estimate import EstimatorGains, estimate, fraction_bits, largest_step
 from .riccati import steady_state
 
 RESOLUTION_BITS = 11
@@ -150,6 +154,7 @@ class Params(NamedTuple):
     a_to_v: int
     operand_shift: int
     output_shift: int
+    acceleration_shift: int
     lead_max: int
     v_max: int
     a_max: int
@@ -176,12 +181,13 @@ START = State(0, 0, 0, 0, 0)
 FLOAT_START = State(0, 0, 0.0, 0.0, 0.0)
 
 
-class Design(EstimatorDesign):
+class Design(Accelerated):
     """Formats, run-time words and latency of the filter for an axis, derived as the module says.
 
     Attributes:
         step_max: largest difference of counts.
-        velocity, lead, v, a, operand: formats of the output, the three states, and r as the multiplier takes it.
+        velocity, acceleration: formats of the outputs.
+        lead, v, a, operand: formats of the three states, and of r as the multiplier takes it.
         shifts: right shifts of the products with the three gains to the LSB of their states.
         words: `kalman_position`, `kalman_velocity`, `kalman_acceleration`.
 
@@ -224,6 +230,7 @@ class Design(EstimatorDesign):
         self.velocity = SQ(i, f)
         self.lead, self.v, self.a = SQ(i_lead, fine), SQ(i, fine + reach), SQ(i_a, fine + 2 * reach)
         self.operand = SQ(i_lead, fine - less)
+        self.acceleration = SQ(i_a + 1, min(f + reach, WIDTH - i_a - 1))
 
         reset = self.words_for(gains)
         units = (1.0, ""), (axis.sample_hz, "1/s"), (axis.sample_hz**2, "1/s^2")
@@ -273,6 +280,7 @@ class Design(EstimatorDesign):
             a_to_v=self.a.f - self.v.f,
             operand_shift=self.lead.f - self.operand.f,
             output_shift=self.v.f - self.velocity.f,
+            acceleration_shift=self.a.f - self.acceleration.f,
             lead_max=self.lead.max,
             v_max=self.velocity.max << (self.v.f - self.velocity.f),
             a_max=self.a.max,
@@ -327,3 +335,15 @@ def float_step(params, state, seen, restart):
     v += a
     r = -lead
     return State(1, seen.count, lead + params.k_x * r, v + params.k_v * r, a + params.k_a * r), v + params.k_v * r, 0
+
+
+@acceleration_of.register(Params)
+@compiled
+def acceleration(params, state):
+    return shift_round_half_up(state.a, params.acceleration_shift)
+
+
+@acceleration_of.register(FloatParams)
+@compiled
+def float_acceleration(params, state):
+    return state.a

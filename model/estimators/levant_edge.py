@@ -46,6 +46,9 @@ there. It is at rest too after half the range of the stamp, since slower edges c
 from constant speed reads exactly 0 after 2.5 to 5 times the time of a count; if a count takes less than the shortest
 interval, two of these come on top. Until then it reads the old speed.
 
+The second output, the acceleration, is a: the slope of the line since the anchor, and 0 at rest. Where the bound holds
+the line in a silence, the output is still a.
+
 Bursts. Some encoders emit several edges at once, after a silence that does not mean a slower axis. `refuted` finds them
 by an edge at which the axis is faster than the last bound allows. For `bursts.doubt_samples` from then on the line is
 not held, and there is no rest by silence. A stop within that time reads the old speed until its end.
@@ -99,6 +102,7 @@ from ..arithmetic.fixed import length_of, saturate, shift_floor, shift_round_hal
 from ..arithmetic.sqrt import isqrt
 from ..encoder.quadrature import RUN_MAX
 from ..runtime.compiled import compiled
+from .acceleration import acceleration_of
 from .bursts import watch
 from .estimate import estimate
 from .levant import sign_of
@@ -289,3 +293,15 @@ def float_step(params, state, seen, restart):
             known = int(known and not gone)
     after = State(1, known, number, stamp, kind, bound, doubt, velocity, acceleration, places, watched)
     return after, line, clumped << 2
+
+
+@acceleration_of.register(Params)
+@compiled
+def acceleration(params, state):
+    return shift_floor(state.acceleration * params.clocks, params.sample_shift)
+
+
+@acceleration_of.register(FloatParams)
+@compiled
+def float_acceleration(params, state):
+    return state.acceleration * params.clocks

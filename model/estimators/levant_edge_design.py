@@ -3,9 +3,11 @@
 `levant_edge` defines the symbols v, a, E, T, L, D and C; q is a count, u the velocity output.
 
 - `velocity` SQ(i, f): i holds twice the largest speed. f resolves sqrt(C q), the speed that C gives within half a
-  count, to 2**-SPEED_BITS, and at least the slowest edges. `acceleration` has the same width, so that one multiplier
-  suffices for both, and its i holds 2**ACCELERATION_BITS C. Both have at most WIDTH_MAX bits, and no more than let
-  their product with a time fit int64.
+  count, to 2**-SPEED_BITS, and at least the slowest edges. `a` has the same width, so that one multiplier suffices
+  for both, and its i holds 2**ACCELERATION_BITS C. Both have at most WIDTH_MAX bits, and no more than let their
+  product with a time fit int64.
+- `acceleration`, the second output, in counts a sample^2: a D, rounded down. i holds the largest a, f resolves C to
+  2**-C_BITS.
 - `mantissa`: number of top bits of a time that multiply and divide. If T is cut to these bits, its relative error is
   2**(1 - mantissa). This changes D/T, the speed of one count in it, by at most 4 LSB of velocity. Times of at least
   four samples and four shortest intervals are exact.
@@ -31,8 +33,9 @@ from ..encoder.quadrature import Seen
 from ..requirements import AxisRequirements
 from ..words import GAIN_BITS, Word
 from . import bursts
+from .acceleration import Accelerated
 from .bursts import Limits, Watch, doubt_samples
-from .estimate import EstimatorDesign, EstimatorGains
+from .estimate import EstimatorGains
 
 HEADROOM_BITS = 2
 """A gain may be raised to 2**HEADROOM_BITS times the designed one at run time."""
@@ -42,6 +45,8 @@ WIDTH_MAX = 40
 """Largest width of velocity and acceleration, bits."""
 ACCELERATION_BITS = 3
 """The acceleration may reach 2**ACCELERATION_BITS C, since an impact exceeds the C of a motion."""
+C_BITS = 20
+"""The acceleration that is given out resolves C to 2**-C_BITS."""
 ROOT_BITS = 5
 """The root of the least error that it limits is resolved to 2**-ROOT_BITS."""
 LEARN_SHIFT = 5
@@ -100,6 +105,7 @@ class Params(NamedTuple):
     bursts: Limits
     velocity_max: int
     acceleration_max: int
+    sample_shift: int
 
 
 class FloatParams(NamedTuple):
@@ -141,11 +147,12 @@ START = State(0, 0, 0, 0, 0, 0, 0, 0, 0, (0, 0, 0, 0), bursts.NOTHING)
 FLOAT_START = State(0, 0, 0, 0, 0, 0.0, 0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0), bursts.NOTHING)
 
 
-class Design(EstimatorDesign):
+class Design(Accelerated):
     """Formats, run-time words and latency of the differentiator for an axis, derived as the module says.
 
     Attributes:
-        velocity, acceleration, error, place: formats of v, a, E over 2**k, and an edge's place times D.
+        velocity, acceleration: formats of the outputs; velocity is also the format of v.
+        a, error, place: formats of a, E over 2**k, and an edge's place times D.
         mantissa: bits of a time when it multiplies and divides.
         shortest: log2 of the shortest interval in use, clocks.
         distance: format of the number of edges passed in an interval.
@@ -194,7 +201,9 @@ class Design(EstimatorDesign):
         f = min(f, WIDTH_MAX - i, 60 - self.mantissa - i)
         self.velocity = SQ(i, axis.shrunk(f))
         i = 1 + ACCELERATION_BITS + bits_for(bound * tau / q / axis.clock_hz)
-        self.acceleration = SQ(i, self.velocity.width - i)
+        self.a = SQ(i, self.velocity.width - i)
+        finest = C_BITS - math.floor(math.log2(bound * tau**2 / q))
+        self.acceleration = SQ(i + bits_for(self.clocks), min(finest, self.a.f))
 
     def _derive_places(self, axis: AxisRequirements) -> None:
         """Derive the formats of errors and places, in counts times D, and of the number of edges passed."""
@@ -245,7 +254,7 @@ class Design(EstimatorDesign):
         return divide_latency(self.velocity.width - 1, QUOTIENT_BITS)
 
     def params(self, words: Mapping[str, int]) -> Params:
-        f, a_f, e_f = self.velocity.f, self.acceleration.f, self.error.f
+        f, a_f, e_f = self.velocity.f, self.a.f, self.error.f
         return Params(
             lambda_=words["levant_edge_lambda"],
             alpha=words["levant_edge_alpha"],
@@ -274,7 +283,8 @@ class Design(EstimatorDesign):
             doubt=self.doubt,
             bursts=self.bursts,
             velocity_max=self.velocity.max,
-            acceleration_max=self.acceleration.max,
+            acceleration_max=self.a.max,
+            sample_shift=a_f - self.acceleration.f,
         )
 
     def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
@@ -290,7 +300,7 @@ class Design(EstimatorDesign):
             self.mantissa,
             self.doubt,
             self.bursts,
-            2.0 ** (self.acceleration.i - 1),
+            2.0 ** (self.a.i - 1),
             2.0 ** bits_for(self.clocks / 4),
             2.0 ** (self.place.i - 1),
         )

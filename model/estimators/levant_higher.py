@@ -5,8 +5,9 @@ correction: the next state is the state of rest.
 """
 
 from ..arithmetic import powers
-from ..arithmetic.fixed import saturate, shift_round_half_up, wrap
+from ..arithmetic.fixed import saturate, shift_floor, shift_round_half_up, wrap
 from ..runtime.compiled import compiled
+from .acceleration import acceleration_of
 from .estimate import estimate
 from .levant import sign_of
 from .levant_higher_design import Design, FloatParams, JerkGains, Params, SnapGains, State
@@ -109,3 +110,15 @@ def float_step(params, state, seen, restart):
     z3 = state.z3 + away * gains[degree - 1] if params.order == 3 else 0.0
     w = state.w + gap + away * gains[0] * root ** (degree - 1) if first else 0.0
     return State(1, seen.count, w, lead, z1, z2, z3), z1, 0
+
+
+@acceleration_of.register(Params)
+@compiled
+def acceleration(params, state):
+    return shift_floor(state.z2, params.acceleration_shift)
+
+
+@acceleration_of.register(FloatParams)
+@compiled
+def float_acceleration(params, state):
+    return state.z2

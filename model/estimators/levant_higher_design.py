@@ -35,6 +35,7 @@ Formats, derived.
   the end of z1, z2 and z3 begin again from 0: they would go on pushing.
 - `velocity`: z1 rounded half up to an LSB of sqrt(C') 2**-OUTPUT_BITS, with C' the bound C in counts a sample^2. Half
   of this LSB is added to the state z1, so the output is its floor.
+- `acceleration`, the second output: z2, rounded down to `acceleration.WIDTH` bits where z2 has more.
 
 Range of the gains. The word is the number of octaves by which L is raised. So every accepted word has the gains of one
 L. L is at most LARGEST_L counts a sample^(order + 1): T is at least 2 samples then, and the steps are still small. The
@@ -66,7 +67,8 @@ from ..arithmetic.fixed import SQ, bits_for
 from ..checks import FieldError
 from ..requirements import AxisRequirements
 from ..words import Word
-from .estimate import EstimatorDesign, EstimatorGains, fraction_bits
+from .acceleration import WIDTH, Accelerated
+from .estimate import EstimatorGains, fraction_bits
 
 LAMBDA = {2: (1.1, 2.12, 2.0), 3: (1.1, 3.06, 4.16, 3.0), 4: (1.1, 4.57, 9.30, 10.03, 5.0)}
 """The coefficients by N, from the power 0 up."""
@@ -139,6 +141,7 @@ class Params(NamedTuple):
     """The largest words of w, z0 - f, z1, z2, z3; the least is one less than the negative."""
     half: int
     output_shift: int
+    acceleration_shift: int
     powers: powers.Params
 
 
@@ -162,7 +165,7 @@ class FloatParams(NamedTuple):
     """c_N to c_0."""
 
 
-class Design(EstimatorDesign):
+class Design(Accelerated):
     """Formats, run-time word and latency of the differentiator for an axis, derived as the module says.
 
     Attributes of the class:
@@ -175,7 +178,7 @@ class Design(EstimatorDesign):
         half: half of the output's LSB, in words of z1.
         powers: the design of the terms c_n r^n, n = N to 1.
         relays: the words of c_0 by octave, in the fraction of the last state.
-        velocity: format of the output.
+        velocity, acceleration: formats of the outputs.
         words: `levant_2_octaves` and so on, by the name.
 
     Raises:
@@ -250,6 +253,7 @@ class Design(EstimatorDesign):
 
         self.velocity = SQ(z[0].i, min(z[0].f, axis.shrunk(fraction_bits(axis, OUTPUT_BITS))))
         self.half = 1 << (z[0].f - self.velocity.f) >> 1
+        self.acceleration = SQ(z[1].i, min(z[1].f, WIDTH - z[1].i))
         error = self.w if self.filtering else gap
         places = ([self.w.f] if self.filtering else []) + [gap.f, *(each.f for each in z)]
         n_max = self.degree - 1
@@ -279,6 +283,7 @@ class Design(EstimatorDesign):
             limits=limits,
             half=self.half,
             output_shift=self.z[0].f - self.velocity.f,
+            acceleration_shift=self.z[1].f - self.acceleration.f,
             powers=self.powers.params,
         )
 

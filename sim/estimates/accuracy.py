@@ -7,13 +7,14 @@ part's, so the stamps are finer too. The row reports the clock.
 """
 
 import math
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 
 from ...model.estimators import registry
+from ...model.estimators.acceleration import Motions
 from ...model.record_axis import GLITCH_CLOCKS
 from ...model.runtime.compiled import compiled
 from ...model.spec import AxisSpec
@@ -22,8 +23,8 @@ from ..scene.load import load
 from ..world.encoder import Errors, offsets
 from . import learning, signals
 from .judge import Judge
-from .motions import velocity
-from .playback import velocities
+from .motions import acceleration, velocity
+from .playback import outputs as played
 from .replay import replay
 from .replay_plan import check_length
 
@@ -150,11 +151,50 @@ def _velocities(motion, times, out):
         out[i] = velocity(motion, times[i])
 
 
+@compiled
+def _accelerations(motion, times, out):
+    """Fill `out` with the exact accelerations (m/s^2) at the times (s)."""
+    for i in range(len(out)):
+        out[i] = acceleration(motion, times[i])
+
+
 def exact_velocity(motion, times: np.ndarray) -> np.ndarray:
     """Return the exact velocities (m/s) of a motion at the given times (s)."""
     out = np.empty(len(times))
     _velocities(motion, times, out)
     return out
+
+
+def exact_acceleration(motion, times: np.ndarray) -> np.ndarray:
+    """Return the exact accelerations (m/s^2) of a motion at the given times (s)."""
+    out = np.empty(len(times))
+    _accelerations(motion, times, out)
+    return out
+
+
+@dataclass(frozen=True)
+class Judged:
+    """The errors of an estimate of a signal.
+
+    Attributes:
+        velocity: the judge of the velocity.
+        acceleration: the judge of the acceleration; None if there is none.
+        still: the judge of an acceleration that is always 0, whose error is the true acceleration.
+        flags: all flags that were raised.
+    """
+
+    velocity: Judge
+    acceleration: Judge | None
+    still: Judge
+    flags: int
+
+    def said_by_row(self) -> dict[str, float | None]:
+        """Return what a row of `measure` says of the acceleration: None where there is none."""
+        own, still = self.acceleration, self.still
+        return {
+            "acceleration_rms_mm_s2": own and own.rms * 1e3,
+            "true_acceleration_rms_mm_s2": own and still.rms * 1e3,
+        }
 
 
 def measure(
@@ -189,7 +229,8 @@ def measure(
     job |= {"bounds": bounds, "gains": gains, "bits_dropped": bits_dropped}
     spec = spec_of(job)
     begin = math.ceil(known.judged_from_s * sample_hz)
-    judge, raised = judged(known, spec, output, backend, encoder)
+    found = judged(known, spec, output, backend, encoder)
+    judge = found.velocity
     return {
         "estimator": estimator,
         "output": output,
@@ -202,20 +243,21 @@ def measure(
             lambda times: exact_velocity(known.motion, times + begin / sample_hz), known.delay_max_s
         ),
         "chatter_mm_s": judge.chatter * 1e3,
+        **found.said_by_row(),
         "clock_hz": spec.clock_hz,
         "velocity_bits": spec.design.estimator.velocity.width,
         **_said_by_row(encoder or {}),
         "acceleration_max_mm_s2": spec.acceleration_max_m_per_s2 * 1e3,
         "jerk_max_mm_s3": spec.jerk_bound_m_per_s3 * 1e3,
         "gains": asdict(spec.design.gains),
-        "flags": spec.design.flag_names(raised),
+        "flags": spec.design.flag_names(found.flags),
     }
 
 
 def judged(
     known: signals.Signal, spec: AxisSpec, output: str, backend: str, encoder: dict[str, Any] | None = None
-) -> tuple[Judge, int]:
-    """Return the judge of an estimate of a signal, from the time on that the signal is judged from, and all flags.
+) -> Judged:
+    """Return the errors of an estimate of a signal, from the time on that the signal is judged from, and all flags.
 
     Args:
         known: the signal.
@@ -230,14 +272,19 @@ def judged(
         passes = learning.Passes(encoder.get("encoder.seed", 1), encoder[LEARNED])
         scale = learning.learned(spec, errors, passes, floating=backend == "float")
     begin = math.ceil(known.judged_from_s * sample_hz)
-    judge, raised = Judge(int(known.seconds * sample_hz) - begin, sample_hz), 0
-    for first, words, flags in velocities(known, spec, output, backend, *errors, learned=scale):
+    samples, both, raised = int(known.seconds * sample_hz), False, 0
+    of_velocity, of_acceleration, still = (Judge(samples - begin, sample_hz) for _ in range(3))
+    for first, made, flags in played(known, spec, output, backend, *errors, learned=scale):
         raised |= flags
-        estimate = words[max(begin - first, 0) :]
-        since = first + len(words) - len(estimate)
+        estimate = made.velocity[max(begin - first, 0) :]
+        since = first + len(made.velocity) - len(estimate)
         times = np.arange(since, since + len(estimate)) / sample_hz
-        judge.add(since - begin, estimate, exact_velocity(known.motion, times))
-    return judge, raised
+        of_velocity.add(since - begin, estimate, exact_velocity(known.motion, times))
+        if isinstance(made, Motions):
+            both, exact = True, exact_acceleration(known.motion, times)
+            of_acceleration.add(since - begin, made.acceleration[max(begin - first, 0) :], exact)
+            still.add(since - begin, np.zeros(len(exact)), exact)
+    return Judged(of_velocity, of_acceleration if both else None, still, raised)
 
 
 def measure_recording(recorded: Recording, estimator: str, output: str, backend: str = "float") -> dict:

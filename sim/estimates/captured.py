@@ -17,11 +17,13 @@ import numpy as np
 import scipy
 
 from ...model.encoder.level import level
+from ...model.estimators.acceleration import Motions, Velocities
 from ...model.record_axis import DECODER_CLOCKS
 from ...model.spec import AxisSpec
 from ...model.stamped import Edges
-from ..loop.backends import number_of, opened
+from ..loop.backends import opened
 from ..recordings.recording import EdgeRecord
+from .outputs import part, room_for
 from .playback import CHUNK, take_all
 
 CLOCK_MAX_HZ = 100e6
@@ -90,8 +92,8 @@ def run_edges(
     backend: str,
     output: str,
     progress: Callable[[int], None] | None = None,
-) -> tuple[np.ndarray, int, float]:
-    """Run edges through the pins of an axis; return (velocity words, or float counts a sample; flags; seconds).
+) -> tuple[Velocities | Motions, int, float]:
+    """Run edges through an axis's pins; return (outputs in words, or float counts and samples; flags; seconds).
 
     Args:
         spec: the axis, from `with_clock`.
@@ -109,16 +111,17 @@ def run_edges(
     # An edge at the time of a sample is the last that is counted at its strobe. Rounding moves none beyond it.
     clocks = np.ceil(edges.ticks / edges.tick_hz * rate_hz * timing.clocks_per_sample * (1 - 1e-15)).astype(np.int64)
     passed = Edges(clocks + (timing.strobe - DECODER_CLOCKS), level(edges.counts))
-    velocity = np.zeros(samples, number_of(backend))
+    made = room_for(spec, backend, samples)
     with opened(spec, backend, spec.design.estimator.choose(output), int(level(edges.start)), short=True) as axis:
         state, taken = axis.state, 0
         # A call with no samples compiles the function, outside the measured time.
-        take_all(axis.controller, state, timing, passed, taken, 0, velocity[:0])
+        take_all(axis.controller, state, timing, passed, taken, 0, part(made, 0, 0))
         began = time.perf_counter()
         for first in range(0, samples, CHUNK):
-            part = velocity[first : first + CHUNK]
-            state, taken = take_all(axis.controller, state, timing, passed, taken, first, part)
+            last = min(first + CHUNK, samples)
+            some = part(made, first, last)
+            state, taken = take_all(axis.controller, state, timing, passed, taken, first, some)
             if progress:
-                progress(first + len(part))
+                progress(last)
         seconds = time.perf_counter() - began
-        return velocity, int(state.flags), seconds
+        return made, int(state.flags), seconds

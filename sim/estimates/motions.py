@@ -1,7 +1,7 @@
-"""Known motions of the handle: position and velocity at any time, and the edges that an encoder makes of them.
+"""Known motions of the handle: position, velocity and acceleration at any time, and the edges that an encoder makes.
 
 An estimate from the edges can then be compared with the exact derivative. A motion is a tuple of numbers or arrays
-whose class has a `position` and a `velocity`; both compile into the loops that use them.
+whose class has a `position`, a `velocity` and an `acceleration`; all compile into the loops that use them.
 """
 
 import math
@@ -77,6 +77,11 @@ def velocity(motion, time_s):
     """Return the exact velocity (m/s) at a time (s)."""
 
 
+@by_type
+def acceleration(motion, time_s):
+    """Return the exact acceleration (m/s^2) at a time (s)."""
+
+
 @position.register(DecayingSine)
 @compiled
 def _decaying_position(motion, time_s):
@@ -93,6 +98,14 @@ def _decaying_velocity(motion, time_s):
     return motion.amplitude_m * math.exp(-motion.decay_per_s * time_s) * turning
 
 
+@acceleration.register(DecayingSine)
+@compiled
+def _decaying_acceleration(motion, time_s):
+    omega, decay = math.tau * motion.frequency_hz, motion.decay_per_s
+    turning = (decay**2 - omega**2) * math.sin(omega * time_s) - 2 * decay * omega * math.cos(omega * time_s)
+    return motion.amplitude_m * math.exp(-decay * time_s) * turning
+
+
 @position.register(Steady)
 @compiled
 def _steady_position(motion, time_s):
@@ -103,6 +116,12 @@ def _steady_position(motion, time_s):
 @compiled
 def _steady_velocity(motion, time_s):
     return motion.speed_m_per_s
+
+
+@acceleration.register(Steady)
+@compiled
+def _steady_acceleration(motion, time_s):
+    return 0.0
 
 
 @position.register(Sine)
@@ -116,6 +135,13 @@ def _sine_position(motion, time_s):
 def _sine_velocity(motion, time_s):
     omega = math.tau * motion.frequency_hz
     return motion.amplitude_m * omega * math.cos(omega * (time_s + motion.since_s))
+
+
+@acceleration.register(Sine)
+@compiled
+def _sine_acceleration(motion, time_s):
+    omega = math.tau * motion.frequency_hz
+    return -motion.amplitude_m * omega**2 * math.sin(omega * (time_s + motion.since_s))
 
 
 @position.register(Sweep)
@@ -133,6 +159,14 @@ def _sweep_velocity(motion, time_s):
     return motion.amplitude_m * omega * math.cos(math.tau * cycles)
 
 
+@acceleration.register(Sweep)
+@compiled
+def _sweep_acceleration(motion, time_s):
+    phase = math.tau * motion.first_hz * math.expm1(motion.growth_per_s * time_s) / motion.growth_per_s
+    omega = math.tau * motion.first_hz * math.exp(motion.growth_per_s * time_s)
+    return motion.amplitude_m * omega * (motion.growth_per_s * math.cos(phase) - omega * math.sin(phase))
+
+
 @position.register(Stop)
 @compiled
 def _stop_position(motion, time_s):
@@ -146,6 +180,14 @@ def _stop_position(motion, time_s):
 def _stop_velocity(motion, time_s):
     braked = max(time_s - motion.brake_s, 0.0)
     return max(motion.speed_m_per_s - motion.deceleration_m_per_s2 * braked, 0.0)
+
+
+@acceleration.register(Stop)
+@compiled
+def _stop_acceleration(motion, time_s):
+    braked = time_s - motion.brake_s
+    braking = 0 <= braked < motion.speed_m_per_s / motion.deceleration_m_per_s2
+    return -motion.deceleration_m_per_s2 if braking else 0.0
 
 
 @compiled
@@ -181,6 +223,17 @@ def _track_velocity(motion, time_s):
         return v[-1]
     rise = (x[i + 1] - x[i]) / h
     return v[i] + s * (2 * (3 * rise - 2 * v[i] - v[i + 1]) + s * 3 * (v[i] + v[i + 1] - 2 * rise))
+
+
+@acceleration.register(Track)
+@compiled
+def _track_acceleration(motion, time_s):
+    i, s = _piece(motion, time_s)
+    x, v, h = motion.position_m, motion.velocity_m_per_s, motion.step_s
+    if not 0 <= s <= 1:
+        return 0.0
+    rise = (x[i + 1] - x[i]) / h
+    return (2 * (3 * rise - 2 * v[i] - v[i + 1]) + s * 6 * (v[i] + v[i + 1] - 2 * rise)) / h
 
 
 @compiled

@@ -6,21 +6,25 @@ its edge was decoded. The pins have no glitches except wanted ones, and `accurac
 """
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from ...model.axis.design import change_of, strobe_of
 from ...model.encoder import scale_map
+from ...model.estimators.acceleration import Motions, Velocities
 from ...model.record_axis import DECODER_CLOCKS
 from ...model.runtime.compiled import compiled, inlined
 from ...model.spec import AxisSpec
 from ...model.stamped import Edges
-from ..loop.backends import is_exact, number_of, opened
+from ...model.velocity_estimator import units_of
+from ..loop.backends import is_exact, opened
 from ..loop.controllers import sample, sample_quietly
 from ..world.encoder import Encoder
 from ..world.lines import Lines
 from ..world.scale import Scale
 from .motions import Encoded, encoded
+from .outputs import room_for, scaled, write
 from .signals import Signal
 
 CHUNK = 1 << 18
@@ -41,11 +45,11 @@ def take(controller, state, timing, edges, taken, k):
 
 
 @compiled
-def take_all(controller, state, timing, edges, taken, first, velocity):
-    """Fill `velocity` with the samples from `first` on; return (state, number of edges taken)."""
-    for i in range(len(velocity)):
+def take_all(controller, state, timing, edges, taken, first, made):
+    """Fill `made`, `Velocities` or `Motions`, with the samples from `first` on; return (state, edges taken)."""
+    for i in range(len(made.velocity)):
         state, taken = take(controller, state, timing, edges, taken, first + i)
-        velocity[i] = state.velocity
+        write(made, i, controller, state)
     return state, taken
 
 
@@ -58,7 +62,7 @@ def encoded_signal(
     return encoded(signal.motion, encoder, signal.seconds, signal.turns_apart_s, lead)
 
 
-def velocities(
+def outputs(
     signal: Signal,
     spec: AxisSpec,
     output: str,
@@ -67,8 +71,8 @@ def velocities(
     scale: Scale | None = None,
     lines: Lines | None = None,
     learned: scale_map.Params | None = None,
-) -> Iterator[tuple[int, np.ndarray, int]]:
-    """Yield the chunks of a signal, each as (first sample, velocities in m/s, sticky flags).
+) -> Iterator[tuple[int, Velocities | Motions, int]]:
+    """Yield the chunks of a signal, each as (first sample, outputs in m/s and m/s^2, sticky flags).
 
     Args:
         signal: the motion and its duration.
@@ -82,11 +86,17 @@ def velocities(
         RuntimeError: if the RTL could not be built.
     """
     passed, parameters = encoded_signal(signal, spec, offsets, scale, lines), spec.design.estimator.choose(output)
-    unit = spec.velocity_unit_m_per_s * (spec.design.estimator.velocity.lsb if is_exact(backend) else 1.0)
+    units = units_of(spec.design.estimator, not is_exact(backend), spec.count_m, spec.sample_hz)
     samples, taken = int(signal.seconds * spec.sample_hz), 0
     with opened(spec, backend, parameters, passed.start_level, scale=learned) as axis:
         state = axis.state
         for first in range(0, samples, CHUNK):
-            velocity = np.zeros(min(CHUNK, samples - first), number_of(backend))
-            state, taken = take_all(axis.controller, state, spec.design.timing, passed.edges, taken, first, velocity)
-            yield first, velocity * unit, int(state.flags)
+            made = room_for(spec, backend, min(CHUNK, samples - first))
+            state, taken = take_all(axis.controller, state, spec.design.timing, passed.edges, taken, first, made)
+            yield first, scaled(made, units), int(state.flags)
+
+
+def velocities(*how: Any, **more: Any) -> Iterator[tuple[int, np.ndarray, int]]:
+    """Yield the chunks of a signal, each as (first sample, velocities in m/s, sticky flags): see `outputs`."""
+    for first, made, flags in outputs(*how, **more):
+        yield first, made.velocity, flags

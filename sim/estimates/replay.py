@@ -17,13 +17,16 @@ from pathlib import Path
 
 import numpy as np
 
+from ...model.estimators.acceleration import Motions
 from ...model.record_time import RecordTime
 from ...model.runtime.result import Summary
 from ...model.runtime.whole_file import whole_file
 from ...model.spec import AxisSpec
+from ...model.velocity_estimator import units_of
 from ..loop.backends import is_exact
 from ..recordings.recording import Recording
 from .captured import run_edges
+from .outputs import scaled
 from .replay_axis import needs_pins, run
 from .replay_plan import DERIVED, check_names, first_judged, plan
 from .settings import Settings, in_counts
@@ -39,6 +42,7 @@ class Replay(Summary):
         gains: the gains by name, with their units.
         clock_hz: clock of the axis and of its pins; without meaning if the counts do not go through pins.
         velocity_counts_per_s: the estimate.
+        acceleration_counts_per_s2: the estimator's acceleration; None if it has none, and on `rtl`.
         difference_counts_per_s: the plain finite difference of the same counts.
         reference_counts_per_s: the zero-phase derivative of the recorded counts.
         flags: names of the sticky flags that are set at the end.
@@ -56,6 +60,7 @@ class Replay(Summary):
     gains: dict[str, float]
     reference_hz: float
     velocity_counts_per_s: np.ndarray
+    acceleration_counts_per_s2: np.ndarray | None
     difference_counts_per_s: np.ndarray
     reference_counts_per_s: np.ndarray
     flags: list[str]
@@ -129,7 +134,7 @@ class Replay(Summary):
         ]
 
     def save(self, path: str | Path) -> None:
-        """Write time, recorded count, velocity and reference of every sample as CSV.
+        """Write time, recorded count, velocity, acceleration if there is one, and reference of every sample as CSV.
 
         Raises:
             OSError: if the file cannot be written.
@@ -138,8 +143,10 @@ class Replay(Summary):
             "time_s": (self.recording.time_s, "%.9f"),
             "count": (self.recording.counts, "%d"),
             "velocity_counts_per_s": (self.velocity_counts_per_s, "%.12g"),
+            "acceleration_counts_per_s2": (self.acceleration_counts_per_s2, "%.12g"),
             "reference_counts_per_s": (self.reference_counts_per_s, "%.12g"),
         }
+        columns = {name: column for name, column in columns.items() if column[0] is not None}
         line = ",".join(form for _, form in columns.values()) + "\n"
         with whole_file(path) as part, part.open("w", encoding="utf-8", newline="") as file:
             file.write(",".join(columns) + "\n")
@@ -179,11 +186,11 @@ def replay(
     planned = plan(recording, estimator, backend, coarsen, acceleration_max_counts_per_s2, settings)
     counts, cutoff, reference, bound, spec, edges = planned
     if edges is None:
-        velocity, flags, seconds = run(spec, counts, backend, output, progress)
+        made, flags, seconds = run(spec, counts, backend, output, progress)
     else:
-        velocity, flags, seconds = run_edges(spec, edges, rate, len(counts), backend, output, progress)
+        made, flags, seconds = run_edges(spec, edges, rate, len(counts), backend, output, progress)
 
-    lsb = spec.design.estimator.velocity.lsb if is_exact(backend) else 1.0
+    true = scaled(made, units_of(spec.design.estimator, not is_exact(backend), coarsen, rate))
     return Replay(
         recording=recording,
         coarsen=coarsen,
@@ -194,11 +201,14 @@ def replay(
         acceleration_max_counts_per_s2=float(bound),
         gains=_gains(spec, rate),
         reference_hz=float(cutoff),
-        velocity_counts_per_s=velocity * (lsb * coarsen * rate),
+        velocity_counts_per_s=true.velocity,
+        acceleration_counts_per_s2=true.acceleration if isinstance(true, Motions) else None,
         difference_counts_per_s=np.diff(counts, prepend=counts[0]) * (coarsen * rate),
         reference_counts_per_s=reference,
         flags=spec.design.flag_names(flags),
-        velocity_sha256=hashlib.sha256(velocity.astype("<i8").tobytes()).hexdigest() if is_exact(backend) else None,
+        velocity_sha256=hashlib.sha256(made.velocity.astype("<i8").tobytes()).hexdigest()
+        if is_exact(backend)
+        else None,
         seconds=seconds,
     )
 

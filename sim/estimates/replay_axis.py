@@ -17,11 +17,14 @@ import numpy as np
 
 from ...model.encoder.level import level
 from ...model.estimators import registry
+from ...model.estimators.acceleration import Motions, Velocities
 from ...model.motion import ranges
 from ...model.record_axis import idle_axis
 from ...model.record_time import RecordTime
 from ...model.spec import AxisSpec
+from ...model.velocity_estimator import run as run_estimator
 from ..loop.backends import opened, whole
+from .outputs import room_for
 from .through_pins import run_pins
 
 
@@ -58,8 +61,8 @@ def run(
     backend: str,
     output: str,
     progress: Callable[[int], None] | None = None,
-) -> tuple[np.ndarray, int, float]:
-    """Run counts through an axis; return (velocity words, or float counts a sample; flags; seconds).
+) -> tuple[Velocities | Motions, int, float]:
+    """Run counts through an axis; return (outputs in words, or float counts and samples; flags; seconds).
 
     Args:
         spec: specification of the axis, with enough clocks in a sample for the largest change.
@@ -71,16 +74,22 @@ def run(
     Raises:
         RuntimeError: if the RTL could not be built.
     """
-    choice = spec.design.estimator.choose(output)
+    design, made = spec.design.estimator, room_for(spec, backend, len(counts))
+    choice = design.choose(output)
     if needs_pins(spec.estimator, backend):
         with opened(spec, backend, choice, int(level(0)), short=True) as (controller, state, _):
-            return run_pins(controller, state, spec.design.timing, counts, progress)
+            return made, *run_pins(controller, state, spec.design.timing, counts, made, progress)
     axis = whole(spec, backend, choice)
     axis.run(counts[:0])  # compiles, outside the measured time
     began = time.perf_counter()
     # Where a recording has its origin is nothing to a velocity: in the middle, no count wraps.
-    record = axis.run(counts - (counts.min() // 2 + counts.max() // 2))
+    centred = counts - (counts.min() // 2 + counts.max() // 2)
+    record = axis.run(centred)
     seconds = time.perf_counter() - began
     if progress:
         progress(len(counts))
-    return record.velocity, int(record.flags[-1]), seconds
+    if isinstance(made, Motions):
+        run_estimator(axis.params.estimator, design.start(axis.floating), centred, made)
+    else:
+        made = Velocities(record.velocity)
+    return made, int(record.flags[-1]), seconds

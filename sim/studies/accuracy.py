@@ -45,16 +45,24 @@ class Accuracy:
 
 def _table(rows: list[dict[str, Any]], unit: str) -> Table:
     flagged = any(row["flags"] for row in rows)
+    accelerated = any(row.get("acceleration_rms_mm_s2") is not None for row in rows)
     lines = []
     for row in rows:
         errors = [f"{row[f'{kind}_{unit}']:.4g}" for kind in ("rms", "max", "chatter")]
-        delay = "" if row["delay_s"] is None else f"{row['delay_s'] * 1e6:.4g}"
+        delay = _shown(row["delay_s"], 1e6)
         flags = [", ".join(row["flags"])] * flagged
+        bent = [_shown(row.get("acceleration_rms_mm_s2"), 1)] * accelerated
         name = f"{row['estimator']} {row['output']}"
-        lines.append([name, row["signal"], f"{row['sample_hz']:g}", *errors, delay, *flags])
+        lines.append([name, row["signal"], f"{row['sample_hz']:g}", *errors, delay, *bent, *flags])
     written = unit.replace("_", "/")
     numbers = ("rate (Hz)", f"RMS ({written})", "largest", "chatter", "delay (us)")
-    return table_of(("estimator", "signal"), (*numbers, *["flags"] * flagged), lines)
+    more = [*["acceleration RMS (mm/s2)"] * accelerated, *["flags"] * flagged]
+    return table_of(("estimator", "signal"), (*numbers, *more), lines)
+
+
+def _shown(value: float | None, scale: float) -> str:
+    """Return a number with a scale, as a table shows it; None is empty."""
+    return "" if value is None else f"{value * scale:.4g}"
 
 
 def jobs(curves: list[Curve], names: list[str], rates_hz: list[int], options: dict) -> list[tuple[str, dict]]:

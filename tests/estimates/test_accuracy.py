@@ -65,9 +65,11 @@ def test_words_cost_no_estimator_more_than_a_hundredth_of_its_error(estimator, o
     """The RMS error of `fixed` is that of `float`; every estimator's own test also compares the samples."""
     signal = signals.load("paper")
     axis = axis_spec(estimator, sample_hz, signal.acceleration_max_m_per_s2)
-    (floating, _), (fixed, flags) = (judged(signal, axis, output, backend) for backend in ("float", "fixed"))
-    assert fixed.rms == pytest.approx(floating.rms, rel=0.01)
-    assert flags == 0
+    floating, fixed = (judged(signal, axis, output, backend) for backend in ("float", "fixed"))
+    assert fixed.velocity.rms == pytest.approx(floating.velocity.rms, rel=0.01)
+    if fixed.acceleration:
+        assert fixed.acceleration.rms == pytest.approx(floating.acceleration.rms, rel=0.01)
+    assert fixed.flags == 0
 
 
 @pytest.mark.parametrize(("estimator", "output"), EVERY_OUTPUT if LONG else [*FEW, ("fdm", "u")])

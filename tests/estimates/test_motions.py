@@ -35,6 +35,17 @@ def test_velocity_is_the_derivative_of_position(name):
     assert np.abs(central - exact).max() < 1e6 * h**2 / 6 + 1e-18 / h + 1e-8
 
 
+@pytest.mark.parametrize("name", MOTIONS)
+def test_acceleration_is_the_derivative_of_velocity(name):
+    path, h = MOTIONS[name], 1e-7
+    times = np.linspace(1e-3, SECONDS - 1e-3, 400) + 1e-5 / 3
+    after, before = (np.array([motions.velocity(path, t + by) for t in times]) for by in (h, -h))
+    exact = np.array([motions.acceleration(path, t) for t in times])
+    # No time is within h of a knot of the track, or of the ends of the braking.
+    assert np.abs((after - before) / (2 * h) - exact).max() < 1e-6 * np.abs(exact).max() + 1e-16 / h
+    assert np.abs(exact).max() > 1 or name == "steady"
+
+
 def test_a_track_is_exact_for_a_cubic():
     def cubic(t):
         return 1e-3 * (t - 40 * t**2 + 900 * t**3), 1e-3 * (1 - 80 * t + 2700 * t**2)
@@ -44,7 +55,10 @@ def test_a_track_is_exact_for_a_cubic():
     times = np.linspace(0, 0.02, 97)
     assert np.abs(positions(path, times) - cubic(times)[0]).max() < 1e-15
     assert np.abs(np.array([motions.velocity(path, t) for t in times]) - cubic(times)[1]).max() < 1e-12
+    bent = np.array([motions.acceleration(path, t) for t in times[:-1]])
+    assert np.abs(bent - 1e-3 * (5400 * times[:-1] - 80)).max() < 1e-9
     # The track continues beyond its ends.
+    assert motions.acceleration(path, -0.1) == motions.acceleration(path, 0.1) == 0
     assert motions.position(path, -0.1) == pytest.approx(-1e-4, rel=1e-12)
     assert motions.velocity(path, 0.1) == pytest.approx(cubic(0.02)[1], rel=1e-12)
 

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from hardwall.model.estimators.acceleration import Motions, Velocities
 from hardwall.sim.estimates import signals
 from hardwall.sim.estimates.accuracy import axis_spec
 from hardwall.sim.estimates.motions import position
-from hardwall.sim.estimates.playback import velocities
+from hardwall.sim.estimates.playback import outputs, velocities
 from hardwall.sim.world.encoder import Encoder, locate, offsets
 
 NONE = (0.0, 0.0, 0.0, 0.0)
@@ -44,3 +45,18 @@ def test_chunks_are_one_record(monkeypatch):
     parts = list(velocities(signal, spec, "u", "fixed", NONE))
     assert [first for first, _, _ in parts] == list(range(0, len(whole), 999))
     assert (np.concatenate([part for _, part, _ in parts]) == whole).all()
+
+
+def test_the_acceleration_comes_where_the_estimator_and_the_backend_have_one():
+    signal = signals.load("stop")
+    kinds = {("kalman", "fixed"): Motions, ("kalman", "float"): Motions, ("levant", "fixed"): Velocities}
+    for (estimator, backend), kind in kinds.items():
+        spec = axis_spec(estimator, 10_000, 12.0)
+        made = [part for _, part, _ in outputs(signal, spec, "u", backend, NONE)]
+        assert {type(part) for part in made} == {kind}
+        velocity = np.concatenate([part.velocity for part in made])
+        assert (velocity == record(signal, spec, "u", backend)).all()
+        if kind is Motions:
+            # The axis brakes from 5 mm/s to a standstill.
+            acceleration = np.concatenate([part.acceleration for part in made])
+            assert np.sum(acceleration[4_900:5_300]) / 10_000 == pytest.approx(-5e-3, rel=0.05)

@@ -250,6 +250,7 @@ def test_samples_are_saved(tmp_path, coarsen):
     with path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0]) == ["time_s", "count", "velocity_counts_per_s", "reference_counts_per_s"]
+    assert result.acceleration_counts_per_s2 is None
     assert [int(row["count"]) for row in rows] == made.counts.tolist()
     assert [float(row["time_s"]) for row in rows] == pytest.approx(made.time_s.tolist(), abs=1e-9)
     assert [float(row["velocity_counts_per_s"]) for row in rows] == pytest.approx(
@@ -260,6 +261,26 @@ def test_samples_are_saved(tmp_path, coarsen):
     # The saved file can be replayed.
     again = replay(load(path, "count"), coarsen=coarsen)
     assert again.velocity_sha256 == result.velocity_sha256
+
+
+@pytest.mark.parametrize("backend", ["float", "fixed"])
+@pytest.mark.parametrize("estimator", ["kalman", "edge-kalman"])
+def test_the_acceleration_is_saved_where_the_estimator_has_one(tmp_path, estimator, backend):
+    """It is in recorded counts and true seconds: the slope of the reference, whose signal is smooth."""
+    made = recording(swing().counts, start_s=0.25)
+    result = replay(made, estimator, None, backend, COARSEN)
+    path = tmp_path / "out.csv"
+    result.save(path)
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    names = ["time_s", "count", "velocity_counts_per_s", "acceleration_counts_per_s2", "reference_counts_per_s"]
+    assert list(rows[0]) == names
+    saved = [float(row["acceleration_counts_per_s2"]) for row in rows]
+    assert saved == pytest.approx(result.acceleration_counts_per_s2.tolist(), rel=1e-11)
+    slope = np.gradient(result.reference_counts_per_s) * made.rate_hz
+    seen, true = (each[result.judged_from :] for each in (result.acceleration_counts_per_s2, slope))
+    assert np.corrcoef(seen, true)[0, 1] > 0.9
+    assert np.std(seen) == pytest.approx(np.std(true), rel=0.3)
     assert [each.name for each in tmp_path.iterdir()] == ["out.csv"]
 
 

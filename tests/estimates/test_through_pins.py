@@ -9,6 +9,7 @@ import pytest
 from hardwall.model import stamped
 from hardwall.model.axis.design import Timing
 from hardwall.model.encoder import quadrature
+from hardwall.model.estimators.acceleration import Velocities
 from hardwall.sim.estimates.replay import replay
 from hardwall.sim.estimates.replay_axis import run
 from hardwall.sim.estimates.through_pins import through_pins
@@ -52,8 +53,8 @@ def extremes(spec, samples=20_000) -> np.ndarray:
 def test_rtl_gives_the_words_of_fixed_at_the_extremes(estimator, output):
     spec = axis_of(estimator)
     counts = extremes(spec)
-    fixed, fixed_flags, _ = run(spec, counts, "fixed", output)
-    rtl, rtl_flags, _ = run(spec, counts, "rtl", output)
+    (fixed, *_), fixed_flags, _ = run(spec, counts, "fixed", output)
+    (rtl,), rtl_flags, _ = run(spec, counts, "rtl", output)
     assert fixed.any()
     assert np.flatnonzero(fixed != rtl).tolist() == []
     assert spec.design.flag_names(rtl_flags) == spec.design.flag_names(fixed_flags)
@@ -91,10 +92,10 @@ def test_every_strobe_sees_the_recorded_count(clocks):
     # A finite difference as wide as the count.
     axis = axis._replace(estimator=axis.estimator._replace(count_width=width, velocity_max=2**width))
     state = stamped.State(0, 0, 0, 0, quadrature.START, spec.design.start(), 0, int(level(0)))
-    controller, velocity = stamped.Controller(decoder, 0, 0, axis), np.zeros(len(counts), np.int64)
+    controller, made = stamped.Controller(decoder, 0, 0, axis), Velocities(np.zeros(len(counts), np.int64))
     edges = stamped.room_for(2 * clocks)
     state, left = through_pins(
-        controller, state, Timing(clocks, clocks - 1, 30), counts, velocity, edges, 0, 0, len(counts)
+        controller, state, Timing(clocks, clocks - 1, 30), counts, made, edges, 0, 0, len(counts)
     )
-    assert velocity.tolist() == np.diff(counts, prepend=0).tolist()
+    assert made.velocity.tolist() == np.diff(counts, prepend=0).tolist()
     assert (left, state.flags) == (0, 0)

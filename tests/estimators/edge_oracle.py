@@ -52,7 +52,7 @@ class Oracle:
     def limited(self, v: Fraction) -> Fraction:
         return max(-self.fastest, min(self.fastest, v))
 
-    def step(self, row) -> tuple[Fraction, int]:
+    def step(self, row) -> tuple[Fraction, int, int]:
         d = self.d
         count, now, *stamps, edge, down, _, restart = row
         wide = 1 << d.time_bits
@@ -94,7 +94,8 @@ class Oracle:
             x, self.known = self.x, self.known and age < wide // 2
             self.forget()
             self.x, line = x, Fraction(0)
-        return self.half_up(line, d.velocity.f) * 2**d.velocity.f, flags
+        bent = self.a * Fraction(d.clocks, 1 << d.unit) * Fraction(2) ** d.acceleration.f
+        return self.half_up(line, d.velocity.f) * 2**d.velocity.f, math.floor(bent), flags
 
     def correct(self, passed: int, interval: int) -> int:
         d, e = self.d, self.d.error
@@ -112,5 +113,5 @@ class Oracle:
         self.x = self.half_up(kx * r, e.f) - r
         fast = self.v + turn + self.half_up(kv * r, d.motion.f)
         self.v = self.limited(fast)
-        self.a = self.held(self.a + self.half_up(ka * r, d.acceleration.f), d.acceleration)
+        self.a = self.held(self.a + self.half_up(ka * r, d.a.f), d.a)
         return int(edges != passed or r != far) | 2 * (self.v != fast)

@@ -6,8 +6,9 @@ from dataclasses import replace
 import cocotb
 import numpy as np
 import pytest
+from accelerated import equals
 from edge_oracle import Oracle
-from filters import equals, rms, run, starts_afresh
+from filters import rms, run, starts_afresh
 
 from hardwall.hdl.estimators.count_kalman import Estimator
 from hardwall.model.estimators import kalman
@@ -15,7 +16,7 @@ from hardwall.model.estimators.count_kalman import START, STEPS, Design
 from hardwall.model.estimators.edge_kalman_design import LEVELS
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import CAMPAIGN, SAMPLES, parameters, simulate
-from hardwall.testing.estimators import follow, model
+from hardwall.testing.accelerations import follow, model
 from stimuli.lengths import some_of
 from stimuli.papers_signal import axis_at, swing
 from stimuli.seeded import seeded
@@ -123,8 +124,8 @@ def oracle(d: Design, rows):
             limited, cell = held != passed, (cell + held + half) % (2 * half) - half
             at, down = now - (held in (1, -1)), int(held < 0)
         before = count
-        velocity, flags = filter_of.step((cell, now & mask, *[at & mask] * 4, 0, down, 1, restart))
-        yield velocity, int(limited or flags != 0)
+        *given, flags = filter_of.step((cell, now & mask, *[at & mask] * 4, 0, down, 1, restart))
+        yield *given, int(limited or flags != 0)
 
 
 @pytest.mark.parametrize("name", ["paper", "mhz", "narrow", "wide", "slow"])

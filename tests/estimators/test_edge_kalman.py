@@ -14,7 +14,8 @@ from hardwall.hdl.estimators.edge_kalman import Estimator
 from hardwall.model.estimators import edge_kalman
 from hardwall.model.estimators.edge_kalman_design import START
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
-from hardwall.testing.estimators import follow, model, names
+from hardwall.testing.accelerations import OUTPUTS, follow, model
+from hardwall.testing.estimators import names
 from stimuli.decoder_outputs import Scale
 from stimuli.lengths import some_of
 from stimuli.seeded import seeded
@@ -93,7 +94,7 @@ def braking(d: edge_kalman.Design, samples: int):
     """
     random, scale = seeded(), Scale(d)
     # In counts a clock per clock.
-    steepest = d.acceleration.max * d.acceleration.lsb / d.clocks / (1 << d.unit)
+    steepest = d.a.max * d.a.lsb / d.clocks / (1 << d.unit)
     while samples > 0:
         up, begin = random.random() < 0.5, scale.now + 1
         if random.random() < 0.5:
@@ -139,10 +140,10 @@ async def outputs_change_with_valid_alone(dut):
         while True:
             await RisingEdge(dut.clk)
             await ReadOnly()
-            now = int(dut.velocity.value), int(dut.saturated.value)
+            now = tuple(int(getattr(dut, name).value) for name in OUTPUTS)
             assert before in (None, now) or dut.valid.value == 1, f"{before} becomes {now} without valid"
             before = now
-            shown.add(now[1])
+            shown.add(now[-1])
 
     watching = cocotb.start_soon(watch())
     for row in islice(rows_of(d, 400), 400):
@@ -185,7 +186,7 @@ def test_model_is_the_exact_equation_rounded_as_documented(name):
     rows = list(rows_of(d, 6000))
     seen, oracle = model(d, rows, START), Oracle(d)
     for k, row in enumerate(rows):
-        assert oracle.step(row) == (seen["velocity"][k], seen["saturated"][k]), f"sample {k}: {row}"
+        assert oracle.step(row) == tuple(seen[name][k] for name in OUTPUTS), f"sample {k}: {row}"
 
 
 # ---- promises -------------------------------------------------------------------------------------------------------

@@ -10,7 +10,8 @@ from hardwall.model.encoder import scale_map
 from hardwall.model.estimators import edge_kalman
 from hardwall.model.estimators.edge_kalman_design import START
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, simulate
-from hardwall.testing.estimators import model, momentary, names
+from hardwall.testing.accelerations import OUTPUTS, model
+from hardwall.testing.estimators import momentary, names
 from stimuli.decoder_outputs import Scale
 from stimuli.lengths import some_of
 from stimuli.seeded import seeded
@@ -73,7 +74,7 @@ async def follows_model(dut):
         "strobe",
         "valid",
         names(d),
-        ("velocity", "saturated", "map_outside"),
+        (*OUTPUTS, "map_outside"),
         rows(d, SAMPLES // 4),
         momentary=momentary(d),
     )
@@ -87,9 +88,7 @@ async def follows_model(dut):
     # The map matters, and without its gate it does not.
     assert np.any(expected["velocity"] != model(Mapped(**parameters()), inputs.rows, START)["velocity"])
     bench.drive(map_enabled=0)
-    inputs, outputs = await bench.campaign(
-        "strobe", "valid", names(d), ("velocity", "saturated"), rows(d, 2000), momentary=momentary(d)
-    )
+    inputs, outputs = await bench.campaign("strobe", "valid", names(d), OUTPUTS, rows(d, 2000), momentary=momentary(d))
     # What the filter knows from before is forgotten by a restart.
     first = int(np.argmax(inputs.column("restart")))
     unmapped = model(Mapped(**parameters()), inputs.rows[first:], START)
@@ -112,6 +111,5 @@ def test_errors_of_whole_counts_are_counts_that_are_moved(name):
     at = [min(max((row[0] + row[7] - d.scale.first) >> BIN_BITS, 0), bins - 1) for row in every]
     plain = [(row[0] + int(moved[here]), *row[1:]) for row, here in zip(every, at, strict=True)]
     found, expected = model(d, every, START), model(Mapped(name), plain, START)
-    assert found["velocity"].tolist() == expected["velocity"].tolist()
-    assert found["saturated"].tolist() == expected["saturated"].tolist()
+    assert {name: found[name].tolist() for name in OUTPUTS} == {name: expected[name].tolist() for name in OUTPUTS}
     assert np.any(found["velocity"] != model(Mapped(name), every, START)["velocity"])

@@ -14,6 +14,7 @@ from hardwall.model.arithmetic.fixed import SQ
 from hardwall.model.axis.axis import Axis
 from hardwall.model.encoder.quadrature import Seen, seen_count
 from hardwall.model.estimators import registry
+from hardwall.model.estimators.acceleration import Accelerated
 from hardwall.model.estimators.estimate import EstimatorDesign, EstimatorGains, estimate
 from hardwall.model.words import Word
 from stimuli.specs import spec
@@ -151,6 +152,7 @@ def test_the_component_is_its_designs(name):
         "velocity",
         "saturated",
         "valid",
+        *(["acceleration"] if isinstance(d, Accelerated) else []),
     ]
     assert members["seen"].flow == In
     assert members["seen"].signature.flip().members == Bus(d.count_width, d.stamp_width).members

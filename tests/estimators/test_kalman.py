@@ -6,17 +6,21 @@ from fractions import Fraction
 import cocotb
 import numpy as np
 import pytest
-from filters import SECONDS, equals, impulse, norms, rms, run, starts_afresh
+from accelerated import equals
+from filters import SECONDS, impulse, norms, rms, run, starts_afresh
 from lowest_sums import BRINKS, brink
 from scipy.linalg import solve_discrete_are
 
 from hardwall.hdl.estimators.kalman import Estimator
 from hardwall.model.axis.axis import Axis
 from hardwall.model.estimators import kalman
+from hardwall.model.estimators.acceleration import Motions
 from hardwall.model.estimators.kalman import FLOAT_START, START, Design, Gains, State, steady_state
 from hardwall.model.estimators.riccati import INDEX_MAX
+from hardwall.model.velocity_estimator import run as run_both
 from hardwall.testing import CAMPAIGN, SAMPLES, parameters, rng, simulate
-from hardwall.testing.estimators import follow, model, reset_words
+from hardwall.testing.accelerations import follow, model
+from hardwall.testing.estimators import reset_words
 from stimuli.lengths import some_of
 from stimuli.papers_signal import BOUND, RATES, axis_at, swing
 from stimuli.seeded import seeded
@@ -111,7 +115,7 @@ def test_the_acceleration_comes_to_an_lsb_beyond_its_lowest_and_stays(name):
 def oracle(d: Design, rows):
     """Yield the outputs of the module's equations in exact rationals, rounded as documented, on unwrapped positions."""
     fine_x, fine_v, fine_a = (Fraction(1, 2**fmt.f) for fmt in (d.lead, d.v, d.a))
-    coarse, out = Fraction(1, 2**d.operand.f), Fraction(1, 2**d.velocity.f)
+    coarse, out, bent = (Fraction(1, 2**fmt.f) for fmt in (d.operand, d.velocity, d.acceleration))
     far, fast, hard = d.lead.max * fine_x, d.velocity.max * out, d.a.max * fine_a
     modulus, half = 2**d.count_width, 2 ** (d.count_width - 1)
     last = position = x = v = a = None
@@ -133,7 +137,8 @@ def oracle(d: Design, rows):
         far_v, far_a = v + k_v * r // fine_v * fine_v, a + k_a * r // fine_a * fine_a
         v, a = max(-fast, min(fast, far_v)), max(-hard, min(hard, far_a))
         x = position + lead + k_x * r // fine_x * fine_x
-        yield math.floor(v / out + Fraction(1, 2)), flags | (v != far_v or a != far_a) << 2
+        given = math.floor(v / out + Fraction(1, 2)), math.floor(a / bent + Fraction(1, 2))
+        yield *given, flags | (v != far_v or a != far_a) << 2
 
 
 @pytest.mark.parametrize("name", ["paper", "mhz", "narrow"])
@@ -189,24 +194,24 @@ def system(gains):
     return update @ PREDICT, update, update @ np.array([-1, 0, 0])
 
 
-def rounding(d_bits: tuple[int, int, int], gains, samples: int) -> float:
-    """Return the largest error at v from all floors, in LSB of lead.
+def rounding(d_bits: tuple[int, int, int], gains, samples: int, state: int = 1) -> float:
+    """Return the largest error at v, or at another state by its number, from all floors, in LSB of lead.
 
     `d_bits` holds the fraction bits that (v, a, operand) have in addition to those of lead.
     """
     a, update, lead = system(gains)
     v_bits, a_bits, operand_bits = d_bits
 
-    def at_v(b):
-        return norms(a, b, samples)[1]
+    def at(b):
+        return norms(a, b, samples)[state]
 
-    of_x = at_v(lead) + at_v([1, 0, 0])
-    of_v = at_v([0, 1, 0])
+    of_x = at(lead) + at([1, 0, 0])
+    of_v = at([0, 1, 0])
     if gains[2] == 0:
         # The acceleration a is exactly 0.
-        return of_x + of_v * 2.0**-v_bits + at_v(gains) * 2.0**-operand_bits
-    of_v += at_v(update @ [0.5, 1, 0])
-    return of_x + of_v * 2.0**-v_bits + at_v([0, 0, 1]) * 2.0**-a_bits + at_v(gains) * 2.0**-operand_bits
+        return of_x + of_v * 2.0**-v_bits + at(gains) * 2.0**-operand_bits
+    of_v += at(update @ [0.5, 1, 0])
+    return of_x + of_v * 2.0**-v_bits + at([0, 0, 1]) * 2.0**-a_bits + at(gains) * 2.0**-operand_bits
 
 
 @pytest.mark.parametrize("integrators", [3, 2])
@@ -226,6 +231,9 @@ def test_the_norms_are_those_of_the_module(integrators):
         error = rounding((reach, 2 * reach, -max(reach - 1, 0)), gains, samples)
         assert error <= kalman.ERROR_NORM
         used.append([v / bounds[0], error / kalman.ERROR_NORM])
+        # The LSB of the acceleration that is given out is 2**-reach of the velocity's.
+        bent = rounding((reach, 2 * reach, -max(reach - 1, 0)), gains, samples, state=2) if integrators == 3 else 0.0
+        assert bent * 2.0 ** (reach - kalman.GUARD_BITS) < 0.5
     # Their purpose: all errors together are less than half an LSB.
     assert kalman.ERROR_NORM * 2.0**-kalman.GUARD_BITS < 0.5
     assert integrators == 2 or (np.max(used, 0) > 0.95).all()
@@ -270,7 +278,7 @@ def test_three_integrators_are_better_than_two():
 
 @pytest.mark.parametrize("name", ["paper", "mhz", "narrow"])
 def test_every_state_settles_to_the_exact_speed(name):
-    """No limit cycle and no dead zone remains in the velocity, from any state."""
+    """No limit cycle and no dead zone remains in the velocity and in the acceleration, from any state."""
     axis, random = spec(name, "kalman"), rng()
     d = axis.design.estimator
     settled = int(80 / min(axis.design.gains.index(axis), 1)) + 1000
@@ -282,9 +290,11 @@ def test_every_state_settles_to_the_exact_speed(name):
                 lead, v, a = (int(random.integers(-top, top + 1)) for top in (d.lead.max, params.v_max, d.a.max))
                 start = State(1, 0, lead, v, a if integrators == 3 else 0)
                 state, _, _ = run(params, start, n * np.arange(1, settled))
-                state, velocity, flags = run(params, state, state.count + n * np.arange(1, 20_001))
-                assert (velocity == n << d.velocity.f).all()
-                assert not flags.any()
+                made = Motions(np.zeros(20_000, np.int64), np.zeros(20_000, np.int64))
+                _, flags = run_both(params, state, state.count + n * np.arange(1, 20_001), made)
+                assert (made.velocity == n << d.velocity.f).all()
+                assert not made.acceleration.any()
+                assert not flags
 
 
 @pytest.mark.parametrize("name", ["paper", "mhz", "narrow"])
@@ -302,6 +312,24 @@ def test_no_input_overflows(name):
         if field == "u":
             assert abs(state.v) * d.v.lsb > 0.95 * np.abs(response).sum() * d.step_max
             assert np.abs(velocity).max() <= d.velocity.max
+
+
+@pytest.mark.parametrize("share", [0.5, -1.0])
+def test_a_constant_acceleration_is_read_to_the_norm_of_the_counts_roundings(share):
+    """A count is off by half a count at most, beside a constant half, which is no acceleration."""
+    axis = spec("mhz", "kalman")
+    d = axis.design.estimator
+    params, true = reset_params(d), share * axis.acceleration_max_m_per_s2 / axis.count_m / axis.sample_hz**2
+    counts = np.floor(true * np.arange(300_000) ** 2 / 2 + 0.3).astype(np.int64)
+    made = Motions(*(np.zeros(len(counts), np.int64) for _ in range(2)))
+    _, flags = run_both(params, START, counts, made)
+    gains = np.array([word.reset * word.format.lsb for word in d.words])
+    a, *_ = system(gains)
+    norm = norms(a, gains, 60_000)[2]
+    seen = made.acceleration[100_000:] * d.acceleration.lsb
+    assert np.abs(seen - true).max() <= norm / 2 + d.acceleration.lsb
+    assert seen.mean() == pytest.approx(true, rel=1e-3)
+    assert not flags
 
 
 def test_the_largest_step_displaces_the_scale():

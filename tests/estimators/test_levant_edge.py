@@ -14,7 +14,8 @@ from hardwall.model.estimators import levant_edge
 from hardwall.model.estimators.bursts import NOTHING, watch
 from hardwall.model.estimators.levant_edge_design import LEARN_SHIFT, START
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
-from hardwall.testing.estimators import follow, model, names, reset_words
+from hardwall.testing.accelerations import OUTPUTS, follow, model
+from hardwall.testing.estimators import names, reset_words
 from stimuli.decoder_outputs import Scale
 from stimuli.lengths import some_of
 from stimuli.seeded import seeded
@@ -208,7 +209,7 @@ class Oracle:
         if rests:
             self.v = self.a = line = Fraction(0)
             self.known = self.known and age < wide // 2
-        return line * 2**v.f, flags
+        return line * 2**v.f, math.floor(self.a * d.clocks * power(d.acceleration.f)), flags
 
     def correct(self, passed, interval, kind, full, lam, alpha):
         d, v, e = self.d, self.d.velocity, self.d.error
@@ -222,18 +223,18 @@ class Oracle:
         size, sign = abs(error), (error > 0) - (error < 0)
         quotient = self.down_to(size * unit / time, v)
         slope = change = min(quotient, power(v.i - 1) - power(-v.f))
-        steepest = d.acceleration.max * power(-d.acceleration.f)
+        steepest = d.a.max * power(-d.a.f)
         if self.length <= d.mantissa and size < d.clocks:
             odd = self.length % 2
             radicand = self.down_to(size, d.radicand) * 2**odd
             root = Fraction(math.isqrt(math.floor(radicand * 4**d.root.f)), 2**d.root.f)
             change = min(change, self.down_to(Fraction(lam) * root * 2 ** (self.length // 2), v))
-        bend = min(self.down_to(change / 2**self.length, d.acceleration), steepest)
+        bend = min(self.down_to(change / 2**self.length, d.a), steepest)
         if self.length <= d.mantissa:
-            bend = min(bend, self.down_to(Fraction(alpha) * 2**self.length, d.acceleration))
+            bend = min(bend, self.down_to(Fraction(alpha) * 2**self.length, d.a))
         far = self.v + turn - sign * change
         self.v = self.fit(far, v.i, v.f)
-        self.a = self.fit(self.a - sign * bend, d.acceleration.i, d.acceleration.f)
+        self.a = self.fit(self.a - sign * bend, d.a.i, d.a.f)
         if full and size < d.clocks and kind != self.anchor[2]:
             bits = math.ceil(math.log2(d.clocks / 4)) + 1
             by = self.down_to(self.fit(error, bits, e.f) / 32 + Fraction(1, 2 ** (d.place.f + 1)), d.place)
@@ -248,7 +249,7 @@ def test_model_is_the_exact_equation_rounded_as_documented(name):
     rows = list(stimulus(d, 6000))
     seen, oracle = model(d, rows, START), Oracle(d)
     for k, row in enumerate(rows):
-        assert oracle.step(row) == (seen["velocity"][k], seen["saturated"][k]), f"sample {k}: {row}"
+        assert oracle.step(row) == tuple(seen[name][k] for name in OUTPUTS), f"sample {k}: {row}"
 
 
 # ---- promises -------------------------------------------------------------------------------------------------------

@@ -77,7 +77,7 @@ def trace(axis: AxisSpec, rows: np.ndarray, floating: bool, share: float) -> Tra
     }
     out = np.zeros((5, len(rows)))
     _trace(Axis(axis, floating, **words).params.estimator, d.start(floating), rows, out)
-    units = (1, 1, 1) if floating else (d.velocity.lsb, d.acceleration.lsb, d.place.lsb)
+    units = (1, 1, 1) if floating else (d.velocity.lsb, d.a.lsb, d.place.lsb)
     velocity, known, stamp, acceleration, apart = out
     return Trace(velocity * units[0], known, stamp, acceleration * units[1], apart * units[2] / d.clocks)
 

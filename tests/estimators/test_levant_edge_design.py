@@ -143,7 +143,7 @@ def test_one_sample_of_words_is_within_the_derived_bound_of_the_algorithm(sample
             same = state._replace(
                 bound=state.bound * lsb,
                 velocity=state.velocity * lsb,
-                acceleration=state.acceleration * d.acceleration.lsb,
+                acceleration=state.acceleration * d.a.lsb,
                 places=places,
             )
             after, velocity, flags = estimate(params, state, now, 0)
@@ -154,7 +154,7 @@ def test_one_sample_of_words_is_within_the_derived_bound_of_the_algorithm(sample
             cut = 2.0 ** (1 - d.mantissa) * (length > d.mantissa) * 2 * (abs(real) + abs(same.velocity) + lsb)
             slope = 6 * lsb + cut
             step = 3 * lsb + slope + limit
-            bend = slope * 2.0**-length + 2 * d.acceleration.lsb
+            bend = slope * 2.0**-length + 2 * d.a.lsb
             late = 2.0 ** (1 - d.mantissa) * abs(real_after.acceleration) * age
             bound = step + bend * age + late + 2 * lsb
             assert flags == 0

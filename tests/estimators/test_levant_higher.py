@@ -16,12 +16,13 @@ from hardwall.model.arithmetic.fixed import SQ
 from hardwall.model.arithmetic.powers import MANTISSA_BITS, STEPS
 from hardwall.model.axis.axis import Axis
 from hardwall.model.encoder.quadrature import seen_count
+from hardwall.model.estimators.acceleration import acceleration_of
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.levant_higher import Filtering2, Filtering3, Order2, Order3
 from hardwall.model.estimators.levant_higher_design import LAMBDA, Design, State
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
-from hardwall.testing.estimators import follow, model
+from hardwall.testing.accelerations import follow, model
 from stimuli.lengths import some_of
 from stimuli.papers_signal import axis_at, swing
 from stimuli.seeded import seeded
@@ -153,8 +154,10 @@ def test_every_step_is_the_published_one_in_exact_arithmetic(name, axis):
     for count, restart, octaves in wrapped(d, rows):
         position = 0 if last is None or restart else position + (count - last + half) % modulus - half
         moved = 0 if last is None or restart else (count - last + half) % modulus - half
-        before, last = state, count
-        state, velocity, flags = estimate(d.params({word.name: octaves}), before, seen_count(count), restart)
+        before, last, params = state, count, d.params({word.name: octaves})
+        state, velocity, flags = estimate(params, before, seen_count(count), restart)
+        bent = Fraction(state.z2) * Fraction(2) ** (d.acceleration.f - f[2])
+        assert acceleration_of(params, state) == math.floor(bent)
         if before is START or restart:
             assert (velocity, flags, state.lead, state.w, state.z2, state.z3) == (0, 0, 0, 0, 0, 0)
             continue

@@ -14,11 +14,13 @@ from hardwall.model.axis.design import strobe_of
 from hardwall.model.encoder.level import level
 from hardwall.model.encoder.quadrature import LATENCY
 from hardwall.model.estimators import levant
+from hardwall.model.estimators.acceleration import Accelerated, acceleration_of
 from hardwall.model.estimators.registry import ESTIMATORS
 from hardwall.testing import rng
 from stimuli.lengths import LONG
 
 SOME = sorted(ESTIMATORS) if LONG else ["edge-kalman", "levant", "mt", "period"]
+ACCELERATED = [name for name, kind in sorted(ESTIMATORS.items()) if issubclass(kind, Accelerated)]
 RATE, CLOCKS = 1000.0, 1 << 17
 CLOCK_HZ = 100e6
 """Of a sample of 2**17 clocks, the next power of two."""
@@ -289,3 +291,34 @@ def test_a_long_standstill_before_the_first_piece_costs_no_warning():
         made = EdgeVelocityEstimator(RATE, "edge-kalman", MOTION, clock_hz=CLOCK_HZ)
         assert made([], []).shape == (0,)
         assert made([5], [7], 7).tolist() == [0.0] * 2000
+
+
+@pytest.mark.parametrize("floating", [False, True])
+@pytest.mark.parametrize("estimator", ACCELERATED if LONG else ["edge-kalman", "levant-edge", "kalman"])
+def test_the_acceleration_is_the_kernels_in_any_pieces(estimator, floating):
+    clocks, counts = walk(400)
+    times = clocks / (CLOCKS * RATE)
+    backend = "float" if floating else "fixed"
+    taken = EdgeVelocityEstimator(RATE, estimator, MOTION, backend=backend, clock_hz=CLOCK_HZ)
+    design, timing = taken.spec.design.estimator, taken.spec.design.timing
+    edges = stamped.Edges(timing.strobe - LATENCY + clocks[1:], level(counts[1:] - counts[0]))
+    params, state = stamped.controller(Axis(taken.spec, floating), int(level(0)))
+    expected, unit = [], (1.0 if floating else design.acceleration.lsb) * RATE**2
+    for k in range(int(clocks[-1]) // CLOCKS + 1):
+        state, some = stamped.sample(params, state, edges, len(edges.clocks), strobe_of(timing, k))
+        edges = stamped.Edges(edges.clocks[some:], edges.levels[some:])
+        expected.append(acceleration_of(params.axis.estimator, state.axis.estimator) * unit)
+    velocity, acceleration = taken.with_acceleration(times, counts)
+    assert acceleration.tolist() == pytest.approx(expected[1:], rel=1e-12)
+    assert np.abs(acceleration).max() > 0
+    again = EdgeVelocityEstimator(RATE, estimator, MOTION, backend=backend, clock_hz=CLOCK_HZ)
+    pieces = [again.with_acceleration(times[piece], counts[piece]) for piece in cuts(len(times))]
+    assert np.concatenate([of_piece for _, of_piece in pieces]).tolist() == acceleration.tolist()
+    assert np.concatenate([of_piece for of_piece, _ in pieces]).tolist() == velocity.tolist()
+
+
+def test_an_estimator_without_an_acceleration_says_which_have_one():
+    taken = EdgeVelocityEstimator(RATE, "mt", MOTION)
+    with pytest.raises(ValueError, match=r"^estimator must be one with an acceleration \(kalman, .*\), not 'mt'$"):
+        taken.with_acceleration([0.0, 1.0], [0, 1])
+    assert len(taken([0.0, 1.0], [0, 1])) == 1000

@@ -5,7 +5,17 @@ import warnings
 import numpy as np
 import pytest
 
-from hardwall.model import Motion, RecordWarning, VelocityEstimator, stamped, velocity, velocity_of_edges
+from hardwall.model import (
+    EdgeVelocityEstimator,
+    Motion,
+    RecordWarning,
+    VelocityEstimator,
+    stamped,
+    velocity,
+    velocity_and_acceleration,
+    velocity_and_acceleration_of_edges,
+    velocity_of_edges,
+)
 from hardwall.model.axis.axis import Axis
 from hardwall.model.encoder.level import level
 from hardwall.model.encoder.quadrature import latency
@@ -270,3 +280,40 @@ def test_times_of_a_wrong_unit_say_what_to_do(times, error, said):
 def test_times_in_a_unit_of_their_own_are_those_in_seconds():
     made = velocity_of_edges(MANY * 1e-3, MANY, 100.0, "period", **WIDE)
     assert velocity_of_edges(MANY.astype("M8[ms]"), MANY, 100.0, "period", **WIDE).tolist() == made.tolist()
+
+
+@pytest.mark.parametrize("backend", ["fixed", "float"])
+def test_the_acceleration_in_one_call_is_that_of_the_estimator(backend):
+    t = np.arange(5000) / 10e3
+    counts = np.stack([np.floor(1000 * np.sin(20 * np.pi * t)), np.floor(500 * np.cos(20 * np.pi * t))]).astype(int)
+    bounds = {"acceleration_max": 5.0, "speed_max": 0.1, "travel": 4e-3}
+    made, accelerations = velocity_and_acceleration(counts, 10e3, count=1e-6, backend=backend, **bounds)
+    assert made.tolist() == velocity(counts, 10e3, count=1e-6, backend=backend, **bounds).tolist()
+    taken = VelocityEstimator(10e3, "kalman", Motion(count=1e-6, **bounds), backend=backend)
+    assert accelerations.tolist() == taken.with_acceleration(counts)[1].tolist()
+    true = -1e-3 * (20 * np.pi) ** 2 * np.sin(20 * np.pi * t)
+    assert (accelerations[0] - true)[1000:].std() < 0.3 * true.std()
+    turned = velocity_and_acceleration(counts.T, 10e3, count=1e-6, backend=backend, axis=0, **bounds)
+    assert turned[1].T.tolist() == accelerations.tolist()
+    none = velocity_and_acceleration(counts[:0], 10e3, count=1e-6, backend=backend, **bounds)
+    assert [each.shape for each in none] == [(0, 5000)] * 2
+
+
+def test_the_acceleration_of_edges_in_one_call_is_that_of_the_estimator():
+    times, counts = walk()
+    made, accelerations = velocity_and_acceleration_of_edges(times, counts, 1e3, clock_hz=1e6, **WIDE)
+    assert made.tolist() == velocity_of_edges(times, counts, 1e3, clock_hz=1e6, **WIDE).tolist()
+    taken = EdgeVelocityEstimator(1e3, "edge-kalman", Motion(**WIDE), clock_hz=1e6)
+    assert accelerations.tolist() == taken.with_acceleration(times, counts)[1].tolist()
+    assert np.abs(accelerations).max() > 0
+
+
+def test_an_estimator_without_an_acceleration_is_refused_in_one_call():
+    with pytest.raises(ValueError, match=r"^estimator must be one with an acceleration \(.*\), not 'levant'$"):
+        velocity_and_acceleration([0, 1], 1e3, "levant")
+    with pytest.raises(ValueError, match=r"^estimator must be one with an acceleration \(.*\), not 'mt'$"):
+        velocity_and_acceleration_of_edges([0.0, 1.0], [0, 1], 1e3, "mt")
+    with pytest.raises(ValueError, match=r"^estimator must be one of fdm, .*, not 'euler'$"):
+        velocity_and_acceleration([0, 1], 1e3, "euler")
+    with pytest.raises(ValueError, match=r"only counts, not 'levant-edge': velocity_of_edges takes the edges"):
+        velocity_and_acceleration([0, 1], 1e3, "levant-edge")

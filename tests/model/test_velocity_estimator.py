@@ -11,6 +11,7 @@ import pytest
 from hardwall.model.axis.axis import Axis
 from hardwall.model.encoder.quadrature import seen_count
 from hardwall.model.estimators import levant
+from hardwall.model.estimators.acceleration import Accelerated, acceleration_of
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.registry import ESTIMATORS
 from hardwall.model.motion import Motion
@@ -22,6 +23,7 @@ from stimuli.specs import PAPER
 
 OF_COUNTS = [name for name, design in ESTIMATORS.items() if not design.uses_stamps()]
 SOME = OF_COUNTS if LONG else ["levant", "kalman", "window"]
+ACCELERATED = [name for name in OF_COUNTS if issubclass(ESTIMATORS[name], Accelerated)]
 MOTION = Motion(count=1e-6, acceleration_max=12.0, speed_max=2.0, travel=0.15)
 RATE = PAPER["sample_hz"]
 
@@ -86,6 +88,44 @@ def test_pieces_join_at_the_last_count():
     with pytest.raises(ValueError, match=f"not by {half} at sample 0"):
         taken(ramp[-1:] + half)
     assert taken(ramp[-1:]).tolist() == [0.0]
+
+
+@pytest.mark.parametrize("backend", ["fixed", "float"])
+@pytest.mark.parametrize("estimator", ACCELERATED)
+def test_the_acceleration_is_the_kernels_in_the_unit_of_the_motion(estimator, backend):
+    counts, taken = swing(), VelocityEstimator(RATE, estimator, MOTION, backend=backend)
+    design, state = taken.spec.design.estimator, taken.spec.design.estimator.start(backend == "float")
+    params = Axis(taken.spec, backend == "float").params.estimator
+    unit = (1.0 if backend == "float" else design.acceleration.lsb) * 1e-6 * RATE**2
+    expected = []
+    for count in counts.tolist():
+        state, *_ = estimate(params, state, seen_count(count), 0)
+        expected.append(acceleration_of(params, state) * unit)
+    velocity, acceleration = taken.with_acceleration(counts)
+    assert acceleration.tolist() == pytest.approx(expected, rel=1e-12)
+    assert np.abs(acceleration).max() > 1.0
+    assert velocity.tolist() == VelocityEstimator(RATE, estimator, MOTION, backend=backend)(counts).tolist()
+
+
+def test_accelerations_come_in_pieces_and_lanes_too():
+    counts = np.stack([swing(), -swing()])
+    velocity, acceleration = VelocityEstimator(RATE, "kalman", MOTION).with_acceleration(counts)
+    taken = VelocityEstimator(RATE, "kalman", MOTION)
+    first = taken.with_acceleration(counts[:, :700].T, axis=0)
+    between = taken(counts[:, 700:1000].T, axis=0)
+    last = taken.with_acceleration(counts[:, 1000:].T, axis=0)
+    assert np.concatenate([first[0], between, last[0]]).T.tolist() == velocity.tolist()
+    assert first[1].T.tolist() == acceleration[:, :700].tolist()
+    assert last[1].T.tolist() == acceleration[:, 1000:].tolist()
+
+
+@pytest.mark.parametrize("estimator", [name for name in OF_COUNTS if name not in ACCELERATED])
+def test_an_estimator_without_an_acceleration_says_which_have_one(estimator):
+    taken = VelocityEstimator(RATE, estimator, MOTION)
+    said = rf"^estimator must be one with an acceleration \(kalman, levant-edge, .*\), not '{estimator}'$"
+    with pytest.raises(ValueError, match=said):
+        taken.with_acceleration(swing())
+    assert taken(swing()).any()
 
 
 def test_a_copy_goes_on_from_the_same_state():

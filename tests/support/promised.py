@@ -23,6 +23,7 @@ FILE = Path(__file__).with_name("promised.txt")
 PYTHON = (
     *(("model", name) for name in ("EdgeVelocityEstimator", "Motion", "Sampler", "VelocityEstimator")),
     *(("model", name) for name in ("velocity", "velocity_of_edges")),
+    *(("model", f"velocity_and_acceleration{of_edges}") for of_edges in ("", "_of_edges")),
     *(("model.axis", "Axis"), ("model.axis", "step"), ("model.spec", "AxisSpec"), ("model.stamped", "run")),
     ("hdl.verilog_module", "VerilogModule"),
     ("sim.scene", "spec"),
