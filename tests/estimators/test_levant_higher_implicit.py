@@ -1,6 +1,7 @@
 """Levant's implicit differentiators of order 2 and 3: RTL against model, the model against exact arithmetic."""
 
 import math
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 
@@ -15,7 +16,9 @@ from hardwall.model.arithmetic.curves import ALIKE, MANTISSA_BITS, STEPS, term
 from hardwall.model.axis.axis import Axis
 from hardwall.model.encoder.quadrature import seen_count
 from hardwall.model.estimators.estimate import estimate
-from hardwall.model.estimators.levant_higher_implicit import LAMBDA, LARGEST_L, Design, Order2, Order3
+from hardwall.model.estimators.levant_higher_design import LAMBDA, MEAN_ERROR, State
+from hardwall.model.estimators.levant_higher_implicit import LARGEST_L, Design, FloatParams, Order2, Order3
+from hardwall.model.runtime.compiled import compiled
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
 from hardwall.testing.estimators import follow, model
 from stimuli.lengths import some_of
@@ -251,3 +254,49 @@ def test_wrap_and_restart(name):
 def test_the_largest_bound_is_the_largest():
     d = limited("levant-2-implicit").design.estimator
     assert (d.lipschitz, d.words[0].high) == (LARGEST_L, 0)
+
+
+@compiled
+def _mean(params, moved, period, phase, settle, samples):
+    """Return how far the mean of z1 is from a steady speed of `moved` counts in `period` samples, in float64."""
+    speed, total = moved / period, 0.0
+    state = State(1, 0, 0.0, speed, speed, 0.0, 0.0)
+    for k in range(settle + samples):
+        state, velocity, _ = estimate(params, state, seen_count(math.floor(moved * k / period + phase)), 0)
+        total += velocity - speed if k >= settle else 0.0
+    return total / samples
+
+
+@every
+def test_the_mean_where_counts_lock_is_as_near_as_that_of_the_explicit_form(name):
+    """Over patterns of up to 12 samples, three phases, and the largest L and less."""
+    d, worst = design(name), 0.0
+    for own in np.geomspace(1, 60, 40)[[*range(12), 16, 20, 30, 39]]:
+        params = FloatParams(d.order, 40, own ** -(d.order + 1), LAMBDA[d.order])
+        for period, moved in ((q, p) for q in range(1, 13) for p in range(q) if math.gcd(p, q) == 1):
+            samples, settle = 4 * period * max(1, int(200 * own / period)), int(60 * own) // period * period
+            for phase in (0.0, 0.01 / period, 0.5 / period):
+                worst = max(worst, abs(_mean(params, moved, period, phase, settle, samples)) * own)
+    assert worst <= MEAN_ERROR[d.order, 0]
+
+
+@every
+@pytest.mark.parametrize(("rate", "jerk"), [(1_000, None), (10_000, 1e5)])
+def test_no_chatter_and_no_bias_at_rest_and_in_constant_motion(name, rate, jerk):
+    """Rest, a steady speed and a steady acceleration in whole counts: the critique in arXiv 2404.02770.
+
+    In float64 the estimate is exact; in words it is within a few LSBs of b. The explicit form is far from both.
+    """
+    of = replace(axis_at(name, rate), jerk_max_m_per_s3=jerk)
+    d, k = of.design.estimator, np.arange(200 if jerk else 800)
+    explicit = replace(axis_at(name.removesuffix("-implicit"), rate), jerk_max_m_per_s3=jerk)
+    for speed, acceleration in ((0, 0), (3, 0), (0, 2), (-5, 2)):
+        counts, truth = speed * k + acceleration * k * k // 2, speed + acceleration * k
+        # A start in motion has its own time; the rest comes after a step.
+        counts[0] += 2
+        assert np.abs(Axis(of, floating=True).run(counts).velocity - truth)[-80:].max() < 1e-9
+        words = Axis(of).run(counts)
+        assert not words.flags.any()
+        assert np.abs(words.velocity * d.velocity.lsb - truth)[-80:].max() <= 4 * d.gap.lsb
+        other = Axis(explicit, floating=True).run(counts).velocity - truth
+        assert np.ptp(other[-80:]) > 20 * d.gap.lsb or np.abs(other[-80:]).min() > 0.9 * acceleration > 0
