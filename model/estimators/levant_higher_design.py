@@ -59,7 +59,7 @@ Limits.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from ..arithmetic import powers
 from ..arithmetic.fixed import SQ, bits_for
@@ -105,7 +105,7 @@ class JerkGains(EstimatorGains):
     """The gain of order 2: the bound L on the jerk, m/s^3."""
 
     jerk_m_per_s3: float
-    largest: ClassVar[float] = LARGEST_L
+    largest = LARGEST_L
 
     @classmethod
     def default(cls, axis: AxisRequirements) -> "JerkGains":
@@ -117,7 +117,7 @@ class SnapGains(EstimatorGains):
     """The gain of order 3: the bound L on the snap, m/s^4."""
 
     snap_m_per_s4: float
-    largest: ClassVar[float] = LARGEST_L
+    largest = LARGEST_L
 
     @classmethod
     def default(cls, axis: AxisRequirements) -> "SnapGains":
@@ -190,6 +190,7 @@ class Design(EstimatorDesign):
     gains_class: ClassVar[type[JerkGains | SnapGains]]
     order: ClassVar[int]
     filtering: ClassVar[int] = 0
+    powers: Any
     ahead: ClassVar[float] = 0.0
 
     def __init__(self, axis: AxisRequirements, gains: JerkGains | SnapGains):
@@ -275,7 +276,7 @@ class Design(EstimatorDesign):
     def latency(self) -> int:
         return STEPS + self.powers.latency
 
-    def params(self, words: Mapping[str, int]) -> Params:
+    def params(self, words: Mapping[str, int]) -> tuple:
         (octaves,) = (words[word.name] for word in self.words)
         fractions = self.w.f, self.gap.f, *(each.f for each in self.z)
         limits = self.w.max, self.gap.max, *(each.max for each in self.z)
@@ -292,7 +293,7 @@ class Design(EstimatorDesign):
             powers=self.powers.params,
         )
 
-    def float_params(self, gains: JerkGains | SnapGains, output: str, si: Mapping[str, float]) -> FloatParams:
+    def float_params(self, gains: JerkGains | SnapGains, output: str, si: Mapping[str, float]) -> tuple:
         ((_, bound),) = vars(gains).items()
         (word,) = self.words
         lipschitz = bound / self._per_l * 2.0 ** si.get(word.name, 0)

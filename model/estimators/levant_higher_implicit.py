@@ -33,7 +33,7 @@ rho. So a word that raises L by octaves shifts the argument and the terms. The t
 - Far beyond, T is nearly the power of |b| of the explicit form, and the two forms differ by less than a count's error
   does. Where L is far below an LSB of b, as at high rates, the tables have only this part.
 
-Formats, saturation, start and words are those of `levant_higher_design`, except:
+Formats, saturation, start and words follow `levant_higher_design`, except:
 
 - `gap` is b, which is larger than z0 - f by the motion that a sample adds at a reversal: AHEAD samples of it.
 - L is at most LARGEST_L counts a sample^(order + 1): beyond, nearly all is finite difference.
@@ -51,7 +51,8 @@ Defoort, Djemai, Loukianov, Int. J. Robust and Nonlinear Control 2021, for the s
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 from ..arithmetic import curves
 from ..arithmetic.fixed import shift_round_half_up, wrap
@@ -70,15 +71,19 @@ ROOT_STEPS = 60
 """Newton's steps for a root in float64, at most: from above they come down to it, and end there."""
 
 
+@dataclass(frozen=True)
 class JerkGains(levant_higher_design.JerkGains):
     """The gain of order 2: the bound L on the jerk, m/s^3."""
 
+    jerk_m_per_s3: float
     largest = LARGEST_L
 
 
+@dataclass(frozen=True)
 class SnapGains(levant_higher_design.SnapGains):
     """The gain of order 3: the bound L on the snap, m/s^4."""
 
+    snap_m_per_s4: float
     largest = LARGEST_L
 
 
@@ -141,7 +146,6 @@ class Design(levant_higher_design.Design):
     """
 
     ahead = AHEAD
-    powers: curves.Design
 
     def _units(self, bound: float, top: int) -> None:
         order, gains = self.order, LAMBDA[self.order]
@@ -172,7 +176,7 @@ class Design(levant_higher_design.Design):
             curves=self.powers.params,
         )
 
-    def float_params(self, gains: JerkGains | SnapGains, output: str, si: Mapping[str, float]) -> FloatParams:
+    def float_params(self, gains: Any, output: str, si: Mapping[str, float]) -> FloatParams:
         ((_, bound),) = vars(gains).items()
         (word,) = self.words
         lipschitz = bound / self._per_l * 2.0 ** si.get(word.name, 0)
