@@ -141,7 +141,7 @@ def test_every_step_is_the_published_one_in_exact_arithmetic(name, axis):
     modulus, half, bound = 2**d.count_width, 2 ** (d.count_width - 1), Fraction(d.lipschitz)
     units = [Fraction(1, 2**each.f) for each in (d.gap, *d.z[: d.order])]
     state, last, far = START, 0, 0
-    for count, restart, octaves in wrapped(d, [*stimulus(d, 4000)]):
+    for count, restart, octaves in wrapped(d, [*stimulus(d, 1500)]):
         before, moved = state, (count - last + half) % modulus - half
         last = count
         state, velocity, flags = estimate(d.params({word.name: octaves}), before, seen_count(count), restart)
@@ -169,7 +169,7 @@ def test_every_step_is_the_published_one_in_exact_arithmetic(name, axis):
             # Two Taylor sums round, each by half an LSB; a term rounds down, and comes from a table.
             slack = 2 * unit + SLACK * share * scale * (size / Fraction(2) ** octaves >= near_band(d))
             assert abs(now * unit - value) <= slack
-    assert far < 3800
+    assert far < 1400
 
 
 @every
