@@ -58,22 +58,7 @@ class Powers(Block):
         m.d.sync += run.eq(Cat(self.start, run[:-1]))
         m.d.comb += self.done.eq(run[-1])
 
-        # The shift, by large steps and then by the last three. `up` counts it; zeros come in from below.
-        steps = [1 << stage for stage in reversed(range((design.width - 1).bit_length()))]
-        early, late = steps[:-STEP_BITS], steps[-STEP_BITS:]
-        top, up = _raised(self.size, early, sum(late))
-        partly, above = Signal(len(top)), Signal(max(len(up), 1))
-        m.d.sync += [partly.eq(top), above.eq(up)]
-        top, up = _raised(partly, late, 0)
-        # D is that of the place at the top, less the shift.
-        place = design.width - 1 + design.params.offset
-        octave, step, empty = Signal(range(design.depth)), Signal(STEP_BITS), Signal()
-        m.d.sync += [
-            octave.eq(place - self.octaves - Cat(up, above)),
-            step.eq(top[-STEP_BITS - 1 : -1]),
-            empty.eq(~top[-1]),
-        ]
-
+        octave, step, empty = leading(m, design, self.size, self.octaves)
         quotient, rest = self._divided(m, octave)
         entry = Cat(step, rest)
         for number, (term, table) in enumerate(zip(design.terms, design.params.tables.tolist(), strict=True)):
@@ -81,9 +66,9 @@ class Powers(Block):
             down = Signal(
                 range(most + 1 - int(design.params.shifts[number]) - design.octaves[0]), name=f"down_{number}"
             )
-            amount = _times(quotient, term.power) + self.octaves + int(design.params.shifts[number])
+            amount = times(quotient, term.power) + self.octaves + int(design.params.shifts[number])
             m.d.sync += [
-                value.eq(Mux(empty, 0, _entry(m, entry, table, f"table_{number}"))),
+                value.eq(Mux(empty, 0, entry_of(m, entry, table, f"table_{number}"))),
                 down.eq(most - amount),
             ]
             m.d.sync += port(self, f"term_{number}").eq((value << most if most > 0 else value >> -most) >> down)
@@ -95,11 +80,34 @@ class Powers(Block):
         bits = (degree - 1).bit_length()
         if 1 << bits == degree:
             return octave[bits:], octave[:bits]
-        both = _entry(m, octave, [each // degree << bits | each % degree for each in range(depth)], "divided")
+        both = entry_of(m, octave, [each // degree << bits | each % degree for each in range(depth)], "divided")
         return both[bits:], both[:bits]
 
 
-def _times(value: Value, factor: int) -> Value:
+def leading(m: Module, design: Design, size: Value, octaves: Value, lowest: int = 0) -> tuple[Signal, Signal, Signal]:
+    """Return, two clocks after a magnitude, the number of its octave, the bits below its leading one, and if it is 0.
+
+    The number of the least octave is `lowest`.
+    """
+    # The shift, by large steps and then by the last three. `up` counts it; zeros come in from below.
+    steps = [1 << stage for stage in reversed(range((design.width - 1).bit_length()))]
+    early, late = steps[:-STEP_BITS], steps[-STEP_BITS:]
+    top, up = _raised(size, early, sum(late))
+    partly, above = Signal(len(top)), Signal(max(len(up), 1))
+    m.d.sync += [partly.eq(top), above.eq(up)]
+    top, up = _raised(partly, late, 0)
+    # The number is that of the place at the top, less the shift.
+    place = design.width - 1 + design.params.offset
+    octave, step, empty = Signal(range(lowest, design.depth)), Signal(STEP_BITS), Signal()
+    m.d.sync += [
+        octave.eq(place - octaves - Cat(up, above)),
+        step.eq(top[-STEP_BITS - 1 : -1]),
+        empty.eq(~top[-1]),
+    ]
+    return octave, step, empty
+
+
+def times(value: Value, factor: int) -> Value:
     """Return a value times a small constant, by shifts and sums: a product would take a multiplier of the part."""
     return sum((value << place for place in range(factor.bit_length()) if factor >> place & 1), Const(0))
 
@@ -119,7 +127,7 @@ def _raised(value: Value, steps: list[int], later: int) -> tuple[Value, Value]:
     return value, Cat(*shifted)
 
 
-def _entry(m: Module, address: Value, table: list[int], name: str) -> Signal:
+def entry_of(m: Module, address: Value, table: list[int], name: str) -> Signal:
     """Return the entry of a table at an address; beyond its end, what costs least."""
     value = Signal(max(max(table).bit_length(), 1), name=name)
     with m.Switch(address):

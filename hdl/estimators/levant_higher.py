@@ -2,12 +2,13 @@
 
 from itertools import pairwise
 
-from amaranth.hdl import Cat, Const, Module, Mux, Signal, signed
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed
 
 from hardwall.model.estimators.levant_higher_design import Design
 
 from ..arithmetic.fixed import fits, fitted, shape, shift_floor, shift_round_half_up
 from ..arithmetic.powers import Powers
+from ..block import Block
 from ..wires import port
 from .acceleration import AcceleratedBlock
 from .levant import arrive
@@ -43,11 +44,12 @@ class Estimator(AcceleratedBlock):
     """
 
     design_class = Design
+    unit_class = Powers
 
     def elaborate(self, platform):
         m = Module()
         design = self.design
-        m.submodules.powers = powers = Powers(design.powers)
+        m.submodules.powers = powers = self.unit_class(design.powers)
         octaves = port(self, design.words[0].name)
         m.d.comb += powers.octaves.eq(octaves)
 
@@ -62,7 +64,7 @@ class Estimator(AcceleratedBlock):
         gap, over, negative, still = Signal(shape(design.gap)), Signal(), Signal(), Signal()
         states = [*([w] if design.filtering else []), lead, *z]
         sums = self._taylor(m, states, gap)
-        corrections = [*self._terms(powers), Mux(still, 0, self._relay(m, octaves))]
+        corrections = self._corrections(m, powers, still)
 
         m.d.comb += [
             self.velocity.eq(z[0] >> design.z[0].f - design.velocity.f),
@@ -100,9 +102,13 @@ class Estimator(AcceleratedBlock):
                 m.next = "SAMPLE"
         return m
 
-    def _terms(self, powers: Powers) -> list[Signal]:
-        """Return the terms of all states but the last."""
-        return [port(powers, f"term_{number}") for number in range(self.design.degree - 1)]
+    def _terms(self, powers: Block) -> list[Signal]:
+        """Return the terms of the states, in their order."""
+        return [port(powers, f"term_{number}") for number in range(len(self.design.powers.widths))]
+
+    def _corrections(self, m: Module, powers: Powers, still: Signal) -> list[Value]:
+        """Return the corrections of all states; `still` tells that there is no error."""
+        return [*self._terms(powers), Mux(still, 0, self._relay(m, powers.octaves))]
 
     def _taylor(self, m: Module, states: list[Signal], gap: Signal) -> list[Signal]:
         """Return every state moved by those that follow it, in registers, which are ready while the powers are made.
@@ -112,9 +118,10 @@ class Estimator(AcceleratedBlock):
         design = self.design
         w, lead, z = states[0], states[design.filtering], states[design.filtering + 1 :]
         f = [design.gap.f, *(each.f for each in design.z)]
-        onward, ahead = Signal(signed(len(z[0]) + 1)), Signal.like(lead)
+        further = self._further(m, z)
+        onward, ahead = Signal(signed(max(len(z[0]), len(further) + 1) + 1)), Signal.like(lead)
         m.d.sync += [
-            onward.eq(z[0] - design.half + shift_round_half_up(z[1], f[2] - f[1] + 1)),
+            onward.eq(z[0] - design.half + further),
             ahead.eq(gap + shift_round_half_up(onward, f[1] - f[0])),
         ]
         sums = [ahead]
@@ -128,6 +135,10 @@ class Estimator(AcceleratedBlock):
             sums.append(Signal(signed(max(len(state), len(change)) + 1), name=f"ahead_{n}"))
             m.d.sync += sums[-1].eq(state + shift_round_half_up(change, f[n + 1] - f[n]))
         return [*sums, z[-1]]
+
+    def _further(self, m: Module, z: list[Signal]) -> Value:
+        """Return what the states after z1 add to it on the way to z0, at its fraction."""
+        return shift_round_half_up(z[1], self.design.z[1].f - self.design.z[0].f + 1)
 
     def _relay(self, m: Module, octaves: Signal) -> Signal:
         """Return the correction of the last state, in a register."""

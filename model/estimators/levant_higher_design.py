@@ -60,7 +60,7 @@ Limits.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from ..arithmetic import powers
 from ..arithmetic.fixed import SQ, bits_for
@@ -107,10 +107,11 @@ class JerkGains(EstimatorGains):
     """The gain of order 2: the bound L on the jerk, m/s^3."""
 
     jerk_m_per_s3: float
+    largest = LARGEST_L
 
     @classmethod
     def default(cls, axis: AxisRequirements) -> "JerkGains":
-        return cls(min(axis.jerk_bound_m_per_s3, LARGEST_L * axis.count_m * float(axis.sample_hz) ** 3))
+        return cls(min(axis.jerk_bound_m_per_s3, cls.largest * axis.count_m * float(axis.sample_hz) ** 3))
 
 
 @dataclass(frozen=True)
@@ -118,13 +119,14 @@ class SnapGains(EstimatorGains):
     """The gain of order 3: the bound L on the snap, m/s^4."""
 
     snap_m_per_s4: float
+    largest = LARGEST_L
 
     @classmethod
     def default(cls, axis: AxisRequirements) -> "SnapGains":
         """Return a part of the jerk's bound J in the time in which J moves a count, (q / J)^(1/3)."""
         jerk = axis.jerk_bound_m_per_s3
         bound = SNAP_SHARE * jerk * (jerk / axis.count_m) ** (1 / 3)
-        return cls(min(bound, LARGEST_L * axis.count_m * float(axis.sample_hz) ** 4))
+        return cls(min(bound, cls.largest * axis.count_m * float(axis.sample_hz) ** 4))
 
 
 class Params(NamedTuple):
@@ -171,6 +173,7 @@ class Design(Accelerated):
     Attributes of the class:
         order: the number of derivatives that are tracked.
         filtering: 1 with filtering, else 0.
+        ahead: samples of a reversal by which `gap` is larger than the peak of z0 - f.
 
     Attributes:
         lipschitz: the designed L, counts a sample^(order + 1).
@@ -187,24 +190,27 @@ class Design(Accelerated):
 
     outputs = ("z1",)
     flags = ("error_saturated", "velocity_saturated", "state_saturated")
+    gains_class: ClassVar[type[JerkGains | SnapGains]]
     order: ClassVar[int]
     filtering: ClassVar[int] = 0
+    powers: Any
+    ahead: ClassVar[float] = 0.0
 
     def __init__(self, axis: AxisRequirements, gains: JerkGains | SnapGains):
         super().__init__(axis, gains)
         ((field, bound),) = vars(gains).items()
         self._per_l = per_l = axis.count_m * float(axis.sample_hz) ** (self.order + 1)
-        self.lipschitz = bound / per_l
-        if not 0 < self.lipschitz <= LARGEST_L or not self._fit(axis, self.lipschitz):
-            most = round(math.log2(LARGEST_L))
+        self.lipschitz, largest = bound / per_l, self.gains_class.largest
+        if not 0 < self.lipschitz <= largest or not self._fit(axis, self.lipschitz):
+            most = round(math.log2(largest))
             least = next((n for n in range(LEAST_OCTAVE, most + 1) if self._fit(axis, 2.0**n)), None)
             if least is None:
                 raise FieldError("estimator", f"{self.name} has no words for the largest speed at this rate")
             raise FieldError(
-                field, f"must be {2.0**least * per_l:g} to {LARGEST_L * per_l:g} at these rates, not {bound!r}"
+                field, f"must be {2.0**least * per_l:g} to {largest * per_l:g} at these rates, not {bound!r}"
             )
         self._formats(axis, self.lipschitz)
-        high = min(OCTAVES[1], math.floor(math.log2(LARGEST_L / self.lipschitz)))
+        high = min(OCTAVES[1], math.floor(math.log2(largest / self.lipschitz)))
         doc = "octaves by which the bound L is raised"
         self.words = (Word(f"{self.name.replace('-', '_')}_octaves", SQ(4, 0), 1.0, "", 0, doc, OCTAVES[0], high),)
 
@@ -223,7 +229,7 @@ class Design(Accelerated):
 
     def _formats(self, axis: AxisRequirements, bound: float) -> None:
         """Derive the formats."""
-        order, top = self.order, min(OCTAVES[1], math.floor(math.log2(LARGEST_L / bound)))
+        order, top = self.order, min(OCTAVES[1], math.floor(math.log2(self.gains_class.largest / bound)))
         low, high = bound * 2.0 ** OCTAVES[0], bound * 2.0**top
         step = 2 * axis.speed_max_counts_per_sample
         own, slowest, fastest = (each ** (-1 / (order + 1)) for each in (bound, low, high))
@@ -240,7 +246,7 @@ class Design(Accelerated):
                 raise ValueError("a state is too wide")
             return SQ(i, f)
 
-        gap = state(peaks[1] * step * tau_low + NOISE, 1 / own)
+        gap = state((peaks[1] * tau_low + self.ahead) * step + NOISE, 1 / own)
         if axis.count_width + 1 + gap.f > WIDEST:
             raise ValueError("a count is too wide")
         self.gap = gap
@@ -254,8 +260,13 @@ class Design(Accelerated):
         self.velocity = SQ(z[0].i, min(z[0].f, axis.shrunk(fraction_bits(axis, OUTPUT_BITS))))
         self.half = 1 << (z[0].f - self.velocity.f) >> 1
         self.acceleration = SQ(z[1].i, min(z[1].f, WIDTH - z[1].i))
-        error = self.w if self.filtering else gap
-        places = ([self.w.f] if self.filtering else []) + [gap.f, *(each.f for each in z)]
+        self._units(bound, top)
+
+    def _units(self, bound: float, top: int) -> None:
+        """Derive the terms for a bound L, which may be raised by `top` octaves."""
+        error = self.w if self.filtering else self.gap
+        z = self.z[: self.order]
+        places = ([self.w.f] if self.filtering else []) + [self.gap.f, *(each.f for each in z)]
         n_max = self.degree - 1
         gains = [LAMBDA[n_max][n] * bound ** ((self.degree - n) / self.degree) for n in range(n_max, -1, -1)]
         terms = tuple(powers.Term(n_max - j, gains[j], places[j]) for j in range(n_max))
@@ -269,7 +280,7 @@ class Design(Accelerated):
     def latency(self) -> int:
         return STEPS + self.powers.latency
 
-    def params(self, words: Mapping[str, int]) -> Params:
+    def params(self, words: Mapping[str, int]) -> tuple:
         (octaves,) = (words[word.name] for word in self.words)
         fractions = self.w.f, self.gap.f, *(each.f for each in self.z)
         limits = self.w.max, self.gap.max, *(each.max for each in self.z)
@@ -287,7 +298,7 @@ class Design(Accelerated):
             powers=self.powers.params,
         )
 
-    def float_params(self, gains: JerkGains | SnapGains, output: str, si: Mapping[str, float]) -> FloatParams:
+    def float_params(self, gains: JerkGains | SnapGains, output: str, si: Mapping[str, float]) -> tuple:
         ((_, bound),) = vars(gains).items()
         (word,) = self.words
         lipschitz = bound / self._per_l * 2.0 ** si.get(word.name, 0)

@@ -36,7 +36,7 @@ GAIN_RANGE = 1e-15, 1e15
 EDGE_ERROR_RANGE = 1e-6, 1.0
 """The ranges of a scene's keys: see `scene.quantities`."""
 SECTION = "controller."
-HIGHER = "levant-2", "levant-3", "levant-2-filtering", "levant-3-filtering"
+HIGHER = tuple(f"levant-{order}{kind}" for kind in ("", "-filtering", "-implicit") for order in (2, 3))
 """The Levants whose bound is of a higher derivative than the acceleration."""
 BOUNDS = {
     "jerk_max_counts_per_s3": (GAIN_RANGE, ("edge-kalman", "count-kalman", *HIGHER)),

@@ -74,11 +74,13 @@ COLOURS = {
     "levant-3": "#7570B3",
     "levant-2-filtering": "#66A61E",
     "levant-3-filtering": "#C2185B",
+    "levant-2-implicit": "#8D6E63",
+    "levant-3-implicit": "#5E35B1",
     "window": "#CC79A7",
     "foaw": "#3FA7D6",
     "least-squares": "#1F4E79",
 }
-MARKERS = dict(zip(COLOURS, "ovsDd<>12^8HphX34|_P*x", strict=True))
+MARKERS = dict(zip(COLOURS, [*"ovsDd<>12^8HphX34|_", "$2$", "$3$", *"P*x"], strict=True))
 OTHER = {"color": "#000000", "marker": "."}
 """The style of an estimator that has no colour here yet."""
 FADED = 0.5

@@ -30,6 +30,8 @@ ACCELERATED = [
     "levant-3",
     "levant-2-filtering",
     "levant-3-filtering",
+    "levant-2-implicit",
+    "levant-3-implicit",
 ]
 each = pytest.mark.parametrize("name", ACCELERATED)
 AXES = ("paper", "mhz", "narrow", "wide")

@@ -32,7 +32,7 @@ class Block:
 RECORDED = ("component.component",)
 """The module of a block that a recorder feeds."""
 BLOCKS = (
-    *(Block(f"arithmetic/{name}") for name in ("divide", "divisionless", "powers", "signed_divide", "sqrt")),
+    *(Block(f"arithmetic/{name}") for name in ("curves", "divide", "divisionless", "powers", "signed_divide", "sqrt")),
     *(Block(f"estimators/{name}") for name in ("bursts", "cycle_times", "history", "kept_edges")),
     *(
         Block(f"estimators/{name}")

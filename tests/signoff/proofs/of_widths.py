@@ -178,7 +178,7 @@ CASES = {
             Bug(levant_higher.Estimator.elaborate, "fitted(led, design.gap.width)", "led[: design.gap.width]"),
             ranges.levant_higher,
         )
-        for name in ("levant-2", "levant-3", "levant-2-filtering", "levant-3-filtering")
+        for name in (f"levant-{order}{kind}" for kind in ("", "-filtering", "-implicit") for order in (2, 3))
     },
     "butterworth": Case(
         partial(estimator, "butterworth"),
