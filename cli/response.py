@@ -44,5 +44,4 @@ def command(
     every = response.cases(case, curves)
     run = partial(options.results, "response", response.respond, store=Store("response"))
     rows = run(response.jobs(every, at_hz, counts, starts, backend))
-    labels = [each.label for each in every for _ in range(len(rows) // len(every))]
-    options.finish(response.Responses(rows, case.scene.name, labels))
+    options.finish(response.Responses(rows, case.scene.name))

@@ -6,7 +6,7 @@ import reports
 
 from support.reports import check
 
-from . import accuracy, hardware, rendered, rivals, trade, walls
+from . import accuracy, hardware, rendered, response, rivals, trade, walls
 
 
 class UnknownError(Exception):
@@ -23,6 +23,7 @@ VIEWS: dict[str, Callable[..., list[str]]] = {
     "by-rate": accuracy.by_rate,
     "jerks": walls.jerks,
     "without-jerk": walls.without_jerk,
+    "responses": response.responses,
     "regions": walls.maps,
     "facts": walls.facts,
     "assumptions": walls.assumptions,

@@ -19,19 +19,14 @@ def draw(responses: Responses) -> Figure:
     title = f"{responses.scene}: an estimate of a sine, by its amplitude; grey: the exact velocity"
     picture = new_figure(1.0 + 2.2 * len(frequencies), title)
     panels = picture.subplots(len(frequencies), 2, sharex=True, squeeze=False)
-    labels = list(dict.fromkeys(responses.labels))
-    known = dict(zip(responses.labels, responses.rows, strict=True))
-    styles = looks([(known[name]["estimator"], known[name]["output"]) for name in labels])
+    known = {row["label"]: (row["estimator"], row["output"]) for row in responses.rows}
+    styles = looks(list(known.values()))
     for (of_gain, of_lead), hz in zip(panels, frequencies, strict=True):
         of_gain.axhline(1.0, color=THEORY, lw=0.8)
         of_lead.axhline(0.0, color=THEORY, lw=0.8)
         ends = []
-        for name, style in zip(labels, styles, strict=True):
-            rows = [
-                row
-                for label, row in zip(responses.labels, responses.rows, strict=True)
-                if label == name and row["frequency_hz"] == hz
-            ]
+        for (name, (estimator, _)), style in zip(known.items(), styles, strict=True):
+            rows = [row for row in responses.rows if (row["label"], row["frequency_hz"]) == (name, hz)]
             counts = [row["amplitude_counts"] for row in rows]
             leads = [math.nan if row["lead_deg"] is None else row["lead_deg"] for row in rows]
             of_gain.plot(counts, [row["gain"] for row in rows], **style)
@@ -44,7 +39,7 @@ def draw(responses: Responses) -> Figure:
                 lw=0,
             )
             of_lead.plot(counts, leads, **style)
-            ends.append((name, leads[-1], ink(rows[0]["estimator"])))
+            ends.append((name, leads[-1], ink(estimator)))
         of_gain.set_ylabel(f"gain at {hz:g} Hz (ratio)")
         of_lead.set_ylabel(f"lead at {hz:g} Hz (degrees)")
         of_gain.set_xscale("log")

@@ -71,15 +71,9 @@ class Sine(NamedTuple):
 
 @dataclass(frozen=True)
 class Responses(Rows):
-    """Gains and leads: rows of `respond`.
-
-    Attributes:
-        scene: name of the scene.
-        labels: of every row, the name of its estimator.
-    """
+    """Gains and leads: rows of `respond`, and the name of the scene."""
 
     scene: str
-    labels: list[str]
 
     def report(self) -> dict[str, Any]:
         """Return what the command line prints, units in the keys."""
@@ -96,9 +90,9 @@ class Responses(Rows):
         for each in self.frequencies_hz:
             heads += [f"gain at {each:g} Hz", f"lead at {each:g} Hz (deg)"]
         lines: dict[tuple[str, float], list[str]] = {}
-        for name, row in zip(self.labels, self.rows, strict=True):
+        for row in self.rows:
             cells = [f"{row['gain']:.3f}", "-" if row["lead_deg"] is None else f"{row['lead_deg']:+.1f}"]
-            lines.setdefault((name, row["amplitude_counts"]), []).extend(cells)
+            lines.setdefault((row["label"], row["amplitude_counts"]), []).extend(cells)
         rows = [[name, f"{amplitude:g}", *cells] for (name, amplitude), cells in lines.items()]
         return [table_of(("estimator",), heads, rows)]
 
@@ -151,7 +145,8 @@ def jobs(
 ) -> list[dict[str, Any]]:
     """Return the arguments of `respond` for every case, amplitude and frequency."""
     return [
-        case.job() | {"frequency_hz": hz, "amplitude_counts": counts, "starts": starts, "backend": backend}
+        case.job()
+        | {"label": case.label, "frequency_hz": hz, "amplitude_counts": counts, "starts": starts, "backend": backend}
         for case, counts, hz in product(every, amplitudes, frequencies_hz)
     ]
 
@@ -160,6 +155,7 @@ def respond(
     scene: str,
     text: str,
     changes: dict[str, Any],
+    label: str,
     frequency_hz: float,
     amplitude_counts: float,
     starts: int,
@@ -168,18 +164,18 @@ def respond(
     """Return the response of the estimator of a scene to one sine, units in the keys.
 
     Args:
-        scene, text, changes: the scene: see `Case`.
+        scene, text, changes, label: the case: see `Case`.
         frequency_hz, amplitude_counts: the sine.
         starts: number of starts.
         backend: `float` or `fixed`.
 
     Returns:
-        estimator, output, sample_hz, frequency_hz, amplitude_counts: what was moved.
+        label, estimator, output, sample_hz, frequency_hz, amplitude_counts: what was moved.
         gain, lead_deg: of the mean over the starts; no lead where the gain is 0.
         gain_from, gain_to: the least and the largest gain of a start.
         flags: names of the estimator's flags that were raised.
     """
-    own = Case("", scene, text, changes).scene
+    own = Case(label, scene, text, changes).scene
     every, raised = [], 0
     for number in range(starts):
         place, phase = start(number)
@@ -189,6 +185,7 @@ def respond(
     mean = sum(every) / starts
     known = own.spec.design.estimator.flags
     return {
+        "label": label,
         "estimator": own.controller.estimator,
         "output": own.estimator_output,
         "sample_hz": own.spec.sample_hz,

@@ -143,7 +143,14 @@ def bits_dropped() -> bits.Bits:
 def responses() -> response.Responses:
     """Return the responses of two estimators, one of which shows nothing of the smallest sine."""
     rows = [
-        {"estimator": name, "output": "u", "sample_hz": 10_000, "frequency_hz": hz, "amplitude_counts": counts}
+        {
+            "label": name,
+            "estimator": name,
+            "output": "u",
+            "sample_hz": 10_000,
+            "frequency_hz": hz,
+            "amplitude_counts": counts,
+        }
         | {
             "gain": gain,
             "lead_deg": None if not gain else -0.1 * hz * scale,
@@ -155,7 +162,7 @@ def responses() -> response.Responses:
         for counts, gain in ((0.5, 0.0), (10.0, 0.9), (100.0, 1.0 / scale))
         for hz in (70.0, 200.0)
     ]
-    return response.Responses(rows, "seed-2011", [row["estimator"] for row in rows])
+    return response.Responses(rows, "seed-2011")
 
 
 def costs_of_boards() -> costs.Costs:
