@@ -9,7 +9,7 @@ SHOWN = 2.0, 3.0, 5.0, 20.0, 100.0
 
 
 def responses(report: Report) -> list[str]:
-    """Return gain and lead of every estimator, a row for each with a frequency, a column for each of some amplitudes."""
+    """Return gain and lead: a row for each estimator and frequency, a column for each of some amplitudes."""
     found: dict[tuple[str, float], dict[float, str]] = {}
     for row in report["rows"]:
         found.setdefault((row["label"], row["frequency_hz"]), {})[row["amplitude_counts"]] = _cell(row)
