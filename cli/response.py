@@ -26,7 +26,7 @@ def command(
     wanted: Annotated[str | None, methods_option(",".join(response.METHODS))] = None,
     frequencies: Annotated[str, typer.Option(metavar="HZ,...", help="frequencies of the sine")] = "20,70,200",
     amplitudes: Annotated[
-        str, typer.Option(metavar="COUNTS,...", help="amplitudes of the sine, 0.5 to 1e6 counts")
+        str, typer.Option(metavar="COUNTS,...", help="amplitudes of the sine, 0.5 to 1e5 counts")
     ] = "1,2,5,10,20,50,100,200",
     starts: StartsOption = STARTS,
     backend: ModelOption = "fixed",

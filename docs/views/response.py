@@ -4,7 +4,7 @@ from typing import Any
 
 from .tables import Report, number, table
 
-SHOWN = 2.0, 3.0, 5.0, 20.0, 100.0
+SHOWN = 2.0, 3.0, 5.0, 20.0, 200.0
 """The amplitudes of the table, counts."""
 
 

@@ -35,7 +35,7 @@ PERIODS, SETTLE_S = 8, 0.15
 """The fewest periods, and the shortest time, before the fit and in it."""
 SAMPLES_MAX = 10_000_000
 """The most samples of a run."""
-AMPLITUDES = 0.5, 1e6
+AMPLITUDES = 0.5, 1e5
 """The least and the largest amplitude, counts: a smaller one is seen at some places in a count only."""
 
 

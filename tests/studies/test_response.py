@@ -126,7 +126,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
         (["--frequencies", "2600"], "--frequencies must be at most a quarter of the sample rate, 2500 Hz, not 2600"),
         (["--frequencies", "0.01"], "--frequencies must be at least 0.016 Hz at this rate, not 0.01"),
         (["--frequencies", "x"], "--frequencies must be numbers of 0.001 to 1e+07 Hz, not 'x'"),
-        (["--amplitudes", "0.4"], "--amplitudes must be numbers of 0.5 to 1e+06 counts, not '0.4'"),
+        (["--amplitudes", "0.4"], "--amplitudes must be numbers of 0.5 to 100000 counts, not '0.4'"),
         (["--amplitudes", "1e4"], "--amplitudes must be at most 1592 counts at 200 Hz"),
         (["--estimators", "best"], "--estimators: estimator must be one of "),
         (["--set", "controller.output=u1"], "--set 'controller.output' must be absent (this command sets it)"),
