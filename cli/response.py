@@ -11,7 +11,7 @@ from ..sim.studies import response
 from ..sim.walls.mapping import STARTS
 from ..sim.walls.methods import methods
 from .errors import BadInput
-from .options import ModelOption, StartsOption, methods_option, numbers_of
+from .options import ModelOption, methods_option, numbers_of
 from .scenes import SceneArgument, curves_of, refuse
 from .study import StudyOptions, study
 
@@ -28,13 +28,15 @@ def command(
     amplitudes: Annotated[
         str, typer.Option(metavar="COUNTS,...", help="amplitudes of the sine, 0.5 to 1e5 counts")
     ] = "1,2,5,10,20,50,100,200",
-    starts: StartsOption = STARTS,
+    starts: Annotated[
+        int, typer.Option(min=1, max=1000, metavar="N", help="places in a count and phases of the sine for each row")
+    ] = STARTS,
     backend: ModelOption = "fixed",
 ) -> None:
     changes = options.changes()
     refuse(changes, ("controller.estimator", "controller.output"), "see --estimators")
-    at_hz = numbers_of(frequencies, "--frequencies", *FREQUENCIES_HZ, "Hz")
-    counts = numbers_of(amplitudes, "--amplitudes", *response.AMPLITUDES, "counts")
+    at_hz = sorted(numbers_of(frequencies, "--frequencies", *FREQUENCIES_HZ, "Hz"))
+    counts = sorted(numbers_of(amplitudes, "--amplitudes", *response.AMPLITUDES, "counts"))
     case = Case.of(scene, changes)
     curves = curves_of(",".join(response.METHODS) if wanted is None else wanted, methods(case.scene))
     try:
@@ -44,4 +46,4 @@ def command(
     every = response.cases(case, curves)
     run = partial(options.results, "response", response.respond, store=Store("response"))
     rows = run(response.jobs(every, at_hz, counts, starts, backend))
-    options.finish(response.Responses(rows, case.scene.name))
+    options.finish(response.Responses(rows, case.scene))

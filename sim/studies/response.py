@@ -4,7 +4,7 @@ The handle moves by A sin(2 pi f t) beside a place in a count. The encoder has n
 The fundamental of the estimate is fitted over whole periods by least squares, with a constant, and divided by the exact
 velocity at the same samples. The quotient's magnitude is the *gain*, its angle the *lead*: negative for an estimate
 that comes late. A linear filter has one response for all amplitudes, but for the quantisation. One that is not linear
-has another at each. A limit cycle at a wall has an amplitude of a few counts, a hit of some hundred.
+has another at each. A vibration at a wall begins with a few counts, and a hit has some hundred.
 
 Starts differ by the place in a count and the phase of the sine: `walls.starts`.
 
@@ -33,7 +33,7 @@ LEVELS = np.array([0, 1, 3, 2])
 """The levels of the pins, a | b << 1, at a count modulo 4."""
 PERIODS, SETTLE_S = 8, 0.15
 """The fewest periods, and the shortest time, before the fit and in it."""
-SAMPLES_MAX = 10_000_000
+SAMPLES_MAX = 2_000_000
 """The most samples of a run."""
 AMPLITUDES = 0.5, 1e5
 """The least and the largest amplitude, counts: a smaller one is seen at some places in a count only."""
@@ -71,13 +71,13 @@ class Sine(NamedTuple):
 
 @dataclass(frozen=True)
 class Responses(Rows):
-    """Gains and leads: rows of `respond`, and the name of the scene."""
+    """Gains and leads: rows of `respond`, and the scene."""
 
-    scene: str
+    scene: Scene
 
     def report(self) -> dict[str, Any]:
         """Return what the command line prints, units in the keys."""
-        return {"scene": self.scene, **super().report()}
+        return {"scene": self.scene.name, **super().report()}
 
     @property
     def frequencies_hz(self) -> list[float]:
@@ -91,10 +91,18 @@ class Responses(Rows):
             heads += [f"gain at {each:g} Hz", f"lead at {each:g} Hz (deg)"]
         lines: dict[tuple[str, float], list[str]] = {}
         for row in self.rows:
-            cells = [f"{row['gain']:.3f}", "-" if row["lead_deg"] is None else f"{row['lead_deg']:+.1f}"]
+            mark = "*" if row["flags"] else ""
+            cells = [f"{row['gain']:.3f}{mark}", "-" if row["lead_deg"] is None else f"{row['lead_deg']:+.1f}"]
             lines.setdefault((row["label"], row["amplitude_counts"]), []).extend(cells)
         rows = [[name, f"{amplitude:g}", *cells] for (name, amplitude), cells in lines.items()]
         return [table_of(("estimator",), heads, rows)]
+
+    def notes(self) -> list[str]:
+        """Return the flags that were raised, and what is left out of the scene."""
+        raised = dict.fromkeys(name for row in self.rows for name in row["flags"])
+        left_out = self.scene.encoder.model_dump(exclude_defaults=True, exclude={"count_m"})
+        said = [f"*: a flag was raised: {', '.join(raised)}"] if raised else []
+        return said + ([f"the encoder has no errors here: without {', '.join(left_out)}"] if left_out else [])
 
 
 def seconds_of(frequency_hz: float) -> float:
@@ -135,8 +143,8 @@ def check(case: Case, frequencies_hz: list[float], amplitudes: list[float]) -> N
     most = spec.speed_max_m_per_s / spec.count_m / (math.tau * largest_hz)
     if max(amplitudes) > most:
         raise ValueError(
-            f"--amplitudes must be at most {most:.4g} counts at {largest_hz:g} Hz, where the axis is at its largest "
-            f"speed, not {max(amplitudes):g}"
+            f"--amplitudes must be at most {math.floor(most)} counts at {largest_hz:g} Hz, where the axis is at its "
+            f"largest speed, not {max(amplitudes):g}"
         )
 
 
@@ -173,7 +181,7 @@ def respond(
         label, estimator, output, sample_hz, frequency_hz, amplitude_counts: what was moved.
         gain, lead_deg: of the mean over the starts; no lead where the gain is 0.
         gain_from, gain_to: the least and the largest gain of a start.
-        flags: names of the estimator's flags that were raised.
+        flags: names of the flags of decoder and estimator that were raised.
     """
     own = Case(label, scene, text, changes).scene
     every, raised = [], 0
@@ -183,7 +191,6 @@ def respond(
         every.append(quotient)
         raised |= flags
     mean = sum(every) / starts
-    known = own.spec.design.estimator.flags
     return {
         "label": label,
         "estimator": own.controller.estimator,
@@ -195,7 +202,7 @@ def respond(
         "lead_deg": math.degrees(cmath.phase(mean)) if mean else None,
         "gain_from": min(map(abs, every)),
         "gain_to": max(map(abs, every)),
-        "flags": [name for name in own.spec.design.flag_names(raised) if name in known],
+        "flags": own.spec.design.flag_names(raised),
     }
 
 

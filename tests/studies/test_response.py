@@ -102,9 +102,36 @@ def test_a_filter_is_the_same_at_all_amplitudes_and_levant_is_not():
     assert all(row["gain_from"] <= row["gain_to"] and row["flags"] == [] for row in rows)
 
 
+IMPLICIT = {"controller.jerk_max_m_per_s3": 1e5}
+
+
+@pytest.mark.parametrize("backend", ["fixed", "float"])
+def test_an_implicit_levant_is_weak_at_a_few_counts_right_at_twenty_and_late_beyond_its_bound(backend):
+    case = Case.of(SCENE, IMPLICIT)
+    every = response.cases(case, [Curve("order 2", "levant-2-implicit", "z1")])
+    few, some, many = (
+        response.respond(**job) for job in response.jobs(every, [150.0], [2.0, 20.0, 500.0], 10, backend)
+    )
+    assert few["gain"] < 0.85
+    assert abs(few["lead_deg"]) < 10
+    assert some["gain"] == pytest.approx(1, abs=0.06)
+    assert many["lead_deg"] < -90
+
+
+def test_what_is_left_out_and_what_is_raised_is_said():
+    leads = Case.of(SCENE, {"encoder.jitter_s": 1e-8}).scene
+    row = {"label": "fdm", "frequency_hz": 70.0, "amplitude_counts": 2.0, "gain": 1.0, "lead_deg": None}
+    result = response.Responses([row | {"flags": ["velocity_saturated"]}], leads)
+    assert result.notes() == [
+        "*: a flag was raised: velocity_saturated",
+        "the encoder has no errors here: without jitter_s",
+    ]
+    assert result.tables()[0].rows == [["fdm", "2", "1.000*", "-"]]
+
+
 def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     picture = tmp_path / "response.png"
-    words = ["response", "--estimators", "fdm,levant:u1", "--frequencies", "70,200", "--amplitudes", "0.5,20"]
+    words = ["response", "--estimators", "fdm,levant:u1", "--frequencies", "200,70", "--amplitudes", "20,0.5"]
     words += ["--starts", 2, "--workers", 1]
     code, out, _ = call(monkeypatch, capsys, *words, "--json", "--plot", picture)
     assert code == 0
@@ -124,10 +151,10 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     ("arguments", "message"),
     [
         (["--frequencies", "2600"], "--frequencies must be at most a quarter of the sample rate, 2500 Hz, not 2600"),
-        (["--frequencies", "0.01"], "--frequencies must be at least 0.016 Hz at this rate, not 0.01"),
+        (["--frequencies", "0.01"], "--frequencies must be at least 0.08 Hz at this rate, not 0.01"),
         (["--frequencies", "x"], "--frequencies must be numbers of 0.001 to 1e+07 Hz, not 'x'"),
         (["--amplitudes", "0.4"], "--amplitudes must be numbers of 0.5 to 100000 counts, not '0.4'"),
-        (["--amplitudes", "1e4"], "--amplitudes must be at most 1592 counts at 200 Hz"),
+        (["--amplitudes", "1e4"], "--amplitudes must be at most 1591 counts at 200 Hz"),
         (["--estimators", "best"], "--estimators: estimator must be one of "),
         (["--set", "controller.output=u1"], "--set 'controller.output' must be absent (this command sets it)"),
         (["eight-axes"], "eight-axes: has several axes"),
