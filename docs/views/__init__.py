@@ -29,7 +29,6 @@ VIEWS: dict[str, Callable[..., list[str]]] = {
     "assumptions": walls.assumptions,
     "devices": walls.devices,
     "frictions": walls.frictions,
-    "waits": walls.waits,
     "hands": walls.hands,
     "gains": walls.gains,
     "cutoffs": walls.cutoffs,

@@ -121,18 +121,6 @@ def frictions(*reports: Report) -> list[str]:
     return table([f"friction; {AREA}", *(each["label"] for each in reports[0]["maps"])], rows)
 
 
-def waits(*reports: Report) -> list[str]:
-    """Return the area of every method, a row for the time after which the hits of each report are judged."""
-    rows = [[_wait(report), *(_area(each) for each in report["maps"])] for report in reports]
-    return table([f"judged after; {AREA}", *(each["label"] for each in reports[0]["maps"])], rows)
-
-
-def _wait(report: Report) -> str:
-    """Return the time after which the hits of a report of `seed-2011` are judged."""
-    seconds = report["maps"][0]["changes"].get("protocol.settle_s")
-    return "the scene's 4 s" if seconds is None else f"{seconds:g} s"
-
-
 def _friction(report: Report) -> str:
     """Return what a table calls the friction of a report of `seed-2011`."""
     changes = report["maps"][0]["changes"]
