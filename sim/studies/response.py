@@ -1,10 +1,10 @@
 """The response of a velocity estimator to a sine, by its frequency and amplitude: what is called describing function.
 
 The handle moves by A sin(2 pi f t) beside a place in a count. The encoder has no errors, and the axis is the scene's.
-The fundamental of the estimate is fitted over whole periods by least squares, with a constant, and divided by the exact
-velocity at the same samples. The quotient's magnitude is the *gain*, its angle the *lead*: negative for an estimate
-that comes late. A linear filter has one response for all amplitudes, but for the quantisation. One that is not linear
-has another at each. A vibration at a wall begins with a few counts, and a hit has some hundred.
+Sine, cosine and a constant are fitted to the estimate over whole periods, by least squares. The fitted sine is divided
+by the exact velocity. The quotient's magnitude is the *gain*. Its angle is the *lead*, negative for a late estimate. A
+linear filter has one response for all amplitudes, but for the quantisation. One that is not linear has another at each.
+A vibration at a wall begins with a few counts, and a hit has some hundred.
 
 Starts differ by the place in a count and the phase of the sine: `walls.starts`.
 
@@ -106,7 +106,7 @@ class Responses(Rows):
 
 
 def seconds_of(frequency_hz: float) -> float:
-    """Return the time before the fit, which is that of the fit too: whole periods."""
+    """Return the time before the fit, and in it: whole periods."""
     return max(PERIODS, math.ceil(SETTLE_S * frequency_hz)) / frequency_hz
 
 
@@ -207,7 +207,7 @@ def respond(
 
 
 def response(scene: Scene, backend: str, sine: Sine) -> tuple[complex, int]:
-    """Return the estimate's fundamental divided by that of the velocity, and the flags of the whole run."""
+    """Return the estimate's fundamental divided by the velocity, and the flags of the run."""
     spec, seconds = scene.spec, seconds_of(sine.frequency_hz)
     chosen = spec.design.estimator.choose(scene.estimator_output)
     axis = whole(spec, backend, chosen | {"encoder_glitch_clocks": scene.glitch_clocks})
