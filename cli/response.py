@@ -11,7 +11,7 @@ from ..sim.studies import response
 from ..sim.walls.mapping import STARTS
 from ..sim.walls.methods import methods
 from .errors import BadInput
-from .options import ModelOption, methods_option, numbers_of
+from .options import BackendOption, methods_option, numbers_of
 from .scenes import SceneArgument, curves_of, refuse
 from .study import StudyOptions, study
 
@@ -31,7 +31,7 @@ def command(
     starts: Annotated[
         int, typer.Option(min=1, max=1000, metavar="N", help="places in a count and phases of the sine for each row")
     ] = STARTS,
-    backend: ModelOption = "fixed",
+    backend: BackendOption = "fixed",
 ) -> None:
     changes = options.changes()
     refuse(changes, ("controller.estimator", "controller.output"), "see --estimators")
@@ -46,4 +46,4 @@ def command(
     every = response.cases(case, curves)
     run = partial(options.results, "response", response.respond, store=Store("response"))
     rows = run(response.jobs(every, at_hz, counts, starts, backend))
-    options.finish(response.Responses(rows, case.scene))
+    options.finish(response.Responses(rows, case.scene.name))

@@ -16,7 +16,7 @@ GAIN_TOP, LEAD_LOW = 2.0, -150.0
 def draw(responses: Responses) -> Figure:
     """Return the picture, with a curve for every estimator; the band of a gain is of the starts."""
     frequencies = responses.frequencies_hz
-    title = f"{responses.scene.name}: an estimate of a sine, by its amplitude; grey: the exact velocity"
+    title = f"{responses.scene}: an estimate of a sine, by its amplitude; grey: the exact velocity"
     picture = new_figure(1.0 + 2.2 * len(frequencies), title)
     panels = picture.subplots(len(frequencies), 2, sharex=True, squeeze=False)
     known = {row["label"]: (row["estimator"], row["output"]) for row in responses.rows}

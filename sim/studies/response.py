@@ -1,10 +1,10 @@
 """The response of a velocity estimator to a sine, by its frequency and amplitude: what is called describing function.
 
-The handle moves by A sin(2 pi f t) beside a place in a count. The encoder has no errors, and the axis is the scene's.
-Sine, cosine and a constant are fitted to the estimate over whole periods, by least squares. The fitted sine is divided
-by the exact velocity. The quotient's magnitude is the *gain*. Its angle is the *lead*, negative for a late estimate. A
-linear filter has one response for all amplitudes, but for the quantisation. One that is not linear has another at each.
-A vibration at a wall begins with a few counts, and a hit has some hundred.
+The handle moves by A sin(2 pi f t) beside a place in a count. Axis and encoder are the scene's. Sine, cosine and a
+constant are fitted to the estimate over whole periods, by least squares. The fitted sine is divided by the exact
+velocity. The quotient's magnitude is the *gain*. Its angle is the *lead*, negative for a late estimate. A linear filter
+has one response for all amplitudes, but for the quantisation. One that is not linear has another at each. A vibration
+at a wall begins with a few counts, and a hit has some hundred.
 
 Starts differ by the place in a count and the phase of the sine: `walls.starts`.
 
@@ -15,22 +15,20 @@ import cmath
 import math
 from dataclasses import dataclass
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from ...model import stamped
-from ...model.axis.design import strobe_of
 from ...model.runtime.result import Rows, Table, table_of
-from ..loop.backends import whole
+from ..estimates.motions import Sine
+from ..estimates.playback import velocities
+from ..estimates.signals import Signal
 from ..scene.case import Case
 from ..scene.schema import Scene
 from ..walls.methods import Curve
 from ..walls.starts import start
 
 METHODS = "fdm-1000", "kalman", "levant", "levant-2"
-LEVELS = np.array([0, 1, 3, 2])
-"""The levels of the pins, a | b << 1, at a count modulo 4."""
 PERIODS, SETTLE_S = 8, 0.15
 """The fewest periods, and the shortest time, before the fit and in it."""
 SAMPLES_MAX = 2_000_000
@@ -39,45 +37,15 @@ AMPLITUDES = 0.5, 1e5
 """The least and the largest amplitude, counts: a smaller one is seen at some places in a count only."""
 
 
-class Sine(NamedTuple):
-    """A motion of an encoder, in counts: amplitude sin(2 pi frequency t + phase) + place."""
-
-    amplitude: float
-    frequency_hz: float
-    phase: float  # rad
-    place: float  # counts
-
-    def at(self, times_s: np.ndarray) -> np.ndarray:
-        """Return the positions, counts."""
-        return self.amplitude * np.sin(math.tau * self.frequency_hz * times_s + self.phase) + self.place
-
-    def passed(self, seconds: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the times (s) from 0 on at which the count changes, ascending, and the counts from then on."""
-        low, high = math.floor(self.place - self.amplitude), math.floor(self.place + self.amplitude)
-        borders = np.arange(low, high + 2)
-        borders = borders[np.abs(borders - self.place) < self.amplitude]
-        rise = np.arcsin((borders - self.place) / self.amplitude)
-        # Upwards a border is the first place of its count; downwards it is the end of that count.
-        angles = np.concatenate([rise, math.pi - rise]) - self.phase
-        counts = np.concatenate([borders, borders - 1])
-        turns = np.arange(-2, math.ceil(seconds * self.frequency_hz) + 2)
-        times = (angles[:, None] + math.tau * turns) / (math.tau * self.frequency_hz)
-        every = np.broadcast_to(counts[:, None], times.shape)
-        order = np.argsort(times, axis=None, kind="stable")
-        times, every = times.ravel()[order], every.ravel()[order]
-        inside = (times > 0) & (times <= seconds)
-        return times[inside], every[inside]
-
-
 @dataclass(frozen=True)
 class Responses(Rows):
-    """Gains and leads: rows of `respond`, and the scene."""
+    """Gains and leads: rows of `respond`, and the name of the scene."""
 
-    scene: Scene
+    scene: str
 
     def report(self) -> dict[str, Any]:
         """Return what the command line prints, units in the keys."""
-        return {"scene": self.scene.name, **super().report()}
+        return {"scene": self.scene, **super().report()}
 
     @property
     def frequencies_hz(self) -> list[float]:
@@ -98,11 +66,9 @@ class Responses(Rows):
         return [table_of(("estimator",), heads, rows)]
 
     def notes(self) -> list[str]:
-        """Return the flags that were raised, and what is left out of the scene."""
+        """Return the flags that were raised."""
         raised = dict.fromkeys(name for row in self.rows for name in row["flags"])
-        left_out = self.scene.encoder.model_dump(exclude_defaults=True, exclude={"count_m"})
-        said = [f"*: a flag was raised: {', '.join(raised)}"] if raised else []
-        return said + ([f"the encoder has no errors here: without {', '.join(left_out)}"] if left_out else [])
+        return [f"*: a flag was raised: {', '.join(raised)}"] if raised else []
 
 
 def seconds_of(frequency_hz: float) -> float:
@@ -175,19 +141,23 @@ def respond(
         scene, text, changes, label: the case: see `Case`.
         frequency_hz, amplitude_counts: the sine.
         starts: number of starts.
-        backend: `float` or `fixed`.
+        backend: one of `backends.BACKENDS`.
 
     Returns:
         label, estimator, output, sample_hz, frequency_hz, amplitude_counts: what was moved.
         gain, lead_deg: of the mean over the starts; no lead where the gain is 0.
         gain_from, gain_to: the least and the largest gain of a start.
-        flags: names of the flags of decoder and estimator that were raised.
+        flags: names of the flags that were raised.
+
+    Raises:
+        RuntimeError: if the RTL could not be built.
     """
     own = Case(label, scene, text, changes).scene
-    every, raised = [], 0
+    count_m, every, raised = own.encoder.count_m, [], 0
     for number in range(starts):
         place, phase = start(number)
-        quotient, flags = response(own, backend, Sine(amplitude_counts, frequency_hz, math.tau * phase, place))
+        motion = Sine(place * count_m, amplitude_counts * count_m, frequency_hz, phase / frequency_hz)
+        quotient, flags = response(own, backend, motion)
         every.append(quotient)
         raised |= flags
     mean = sum(every) / starts
@@ -206,20 +176,16 @@ def respond(
     }
 
 
-def response(scene: Scene, backend: str, sine: Sine) -> tuple[complex, int]:
-    """Return the estimate's fundamental divided by the velocity, and the flags of the run."""
-    spec, seconds = scene.spec, seconds_of(sine.frequency_hz)
-    chosen = spec.design.estimator.choose(scene.estimator_output)
-    axis = whole(spec, backend, chosen | {"encoder_glitch_clocks": scene.glitch_clocks})
-    samples = math.ceil(2 * seconds * spec.sample_hz)
-    times, counts = sine.passed(2 * seconds)
-    first = int(np.floor(sine.at(np.zeros(1)))[0])
-    clocks = np.ceil(times * spec.clock_hz).astype(np.int64)
-    record = stamped.run(axis, clocks, LEVELS[counts % 4], samples, int(LEVELS[first % 4]))
-    at_s = strobe_of(axis.design.timing, np.arange(samples)) / spec.clock_hz
-    fitted = slice(samples - round(seconds * spec.sample_hz), None)
-    angles = math.tau * sine.frequency_hz * at_s[fitted] + sine.phase
+def response(scene: Scene, backend: str, motion: Sine) -> tuple[complex, int]:
+    """Return the fitted sine divided by the velocity, and the flags of the run."""
+    spec, seconds = scene.spec, seconds_of(motion.frequency_hz)
+    # In a quarter of a period it turns once at most.
+    known = Signal("sine", motion, 2 * seconds, seconds, spec.acceleration_max_m_per_s2, 0.25 / motion.frequency_hz)
+    chunks = [*velocities(known, spec, scene.estimator_output, backend, *scene.encoder.errors)]
+    estimate = np.concatenate([chunk for _, chunk, _ in chunks])
+    first = math.ceil(seconds * spec.sample_hz)
+    angles = math.tau * motion.frequency_hz * (np.arange(first, len(estimate)) / spec.sample_hz + motion.since_s)
     basis = np.stack([np.cos(angles), np.sin(angles), np.ones(len(angles))], axis=1)
-    cosine, minus_sine, _ = np.linalg.lstsq(basis, record.velocity_m_per_s[fitted] / spec.count_m)[0].tolist()
-    peak = math.tau * sine.frequency_hz * sine.amplitude
-    return complex(cosine, -minus_sine) / peak, int(record.flags[-1])
+    cosine, sine, _ = np.linalg.lstsq(basis, estimate[first:])[0].tolist()
+    peak_m_per_s = math.tau * motion.frequency_hz * motion.amplitude_m
+    return complex(cosine, -sine) / peak_m_per_s, chunks[-1][2]

@@ -8,6 +8,7 @@ from cocotb.handle import HierarchyObject
 
 from hardwall.hdl.estimators.estimate import EstimatorBlock
 from hardwall.model.encoder.quadrature import Seen
+from hardwall.model.estimators.acceleration import Accelerated, Motions, Velocities, keep
 from hardwall.model.estimators.estimate import EstimatorDesign, estimate
 from hardwall.model.runtime.compiled import compiled
 from hardwall.testing import Bench, check
@@ -28,10 +29,19 @@ def reset_words(design: EstimatorDesign) -> list[int]:
     return [word.reset for word in design.words]
 
 
+def outputs(design: EstimatorDesign) -> tuple[str, ...]:
+    """Return the names of an estimator's outputs, which are all compared."""
+    return (*_kind(design)._fields, "saturated")
+
+
+def _kind(design: EstimatorDesign) -> type[Velocities | Motions]:
+    return Motions if isinstance(design, Accelerated) else Velocities
+
+
 @compiled
-def run(params: tuple, state: tuple, seen: Any, restart: np.ndarray, velocity: np.ndarray, flags: np.ndarray) -> tuple:
-    """Fill `velocity` and `flags` with the outputs for records of what the decoder shows; return the last state."""
-    for k in range(len(velocity)):
+def run(params: tuple, state: tuple, seen: Any, restart: np.ndarray, made: tuple, flags: np.ndarray) -> tuple:
+    """Fill `made`, `Velocities` or `Motions`, and `flags` for records of what the decoder shows; return the state."""
+    for k in range(len(restart)):
         sight = Seen(
             seen.count[k],
             seen.stamp[k],
@@ -43,23 +53,26 @@ def run(params: tuple, state: tuple, seen: Any, restart: np.ndarray, velocity: n
             seen.down[k],
             seen.run[k],
         )
-        state, velocity[k], flags[k] = estimate(params, state, sight, restart[k])
+        state, velocity, flags[k] = estimate(params, state, sight, restart[k])
+        keep(made, k, velocity, params, state)
     return state
 
 
 def model(design: EstimatorDesign, rows: Iterable[tuple[int, ...]], start: tuple) -> dict[str, np.ndarray]:
-    """Return velocity and flags for rows in the order of `names`, from the state `start`."""
+    """Return the outputs, as `outputs` names them, for rows in the order of `names`, from the state `start`."""
     columns = np.array(list(rows), np.int64).T.copy()
     taken, (restart, *words) = dict(zip(design.inputs, columns, strict=False)), columns[len(design.inputs) :]
-    zero, velocity, flags = (np.zeros_like(restart) for _ in range(3))
+    kind = _kind(design)
+    zero, flags, *made = (np.zeros_like(restart) for _ in range(2 + len(kind._fields)))
     seen = [taken.get(name, zero) for name in Seen._fields]
     # The kernel runs as long as the run-time words stay.
     changes = np.flatnonzero(sum((word[1:] != word[:-1] for word in words), np.False_)) + 1
     for part in map(slice, [0, *changes], [*changes, len(restart)]):
         held = {word.name: int(values[part.start]) for word, values in zip(design.words, words, strict=True)}
         sight = Seen(*(column[part] for column in seen))
-        start = run(design.params(held), start, sight, restart[part], velocity[part], flags[part])
-    return {"velocity": velocity, "saturated": flags}
+        room = kind(*(each[part] for each in made))
+        start = run(design.params(held), start, sight, restart[part], room, flags[part])
+    return dict(zip(outputs(design), (*made, flags), strict=True))
 
 
 async def follow(
@@ -71,11 +84,10 @@ async def follow(
     """
     design, bench = component.design, Bench(dut, component)
     await bench.reset()
-    later = bench.monitor("strobe", "velocity", "saturated")
-    inputs, outputs = await bench.campaign(
-        "strobe", "valid", names(design), ("velocity", "saturated"), rows, momentary=momentary(design)
-    )
+    wanted = outputs(design)
+    later = bench.monitor("strobe", *wanted)
+    inputs, seen = await bench.campaign("strobe", "valid", names(design), wanted, rows, momentary=momentary(design))
     expected = model(design, inputs.rows, start)
-    check(inputs, outputs, expected, component.latency)
+    check(inputs, seen, expected, component.latency)
     check(inputs, later, {name: np.append(0, values[:-1]) for name, values in expected.items()})
     return expected

@@ -6,7 +6,7 @@ from hardwall.model.encoder.quadrature import seen_count
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.runtime.compiled import compiled
 from hardwall.testing import Bench
-from hardwall.testing.estimators import model
+from hardwall.testing.estimators import model, outputs
 
 SECONDS = {1_000: 5.0, 10_000: 5.0, 100_000: 2.0, 1_000_000: 1.25, 10_000_000: 0.5}
 """The length of the paper's signal that is run at each rate, s; the first fifth is not judged."""
@@ -46,12 +46,12 @@ async def starts_afresh(dut, component, words: dict[str, int]) -> None:
 
 
 def equals(oracle, d, rows, start) -> None:
-    """Hold the model to an oracle, which yields velocity and flags; counts of the rows wrap."""
+    """Hold the model to an oracle, which yields all outputs of a sample; counts of the rows wrap."""
     half = 1 << (d.count_width - 1)
     rows = [((count + half) % (2 * half) - half, *rest) for count, *rest in rows]
     seen = model(d, rows, start)
-    for k, (velocity, flags) in enumerate(oracle(d, rows)):
-        assert (velocity, flags) == (seen["velocity"][k], seen["saturated"][k]), f"sample {k}: {rows[k]}"
+    for k, given in enumerate(oracle(d, rows)):
+        assert given == tuple(seen[name][k] for name in outputs(d)), f"sample {k}: {rows[k]}"
 
 
 def impulse(a: np.ndarray, b, samples: int) -> np.ndarray:

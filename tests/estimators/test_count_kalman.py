@@ -6,9 +6,8 @@ from dataclasses import replace
 import cocotb
 import numpy as np
 import pytest
-from accelerated import equals
 from edge_oracle import Oracle
-from filters import rms, run, starts_afresh
+from filters import equals, rms, run, starts_afresh
 
 from hardwall.hdl.estimators.count_kalman import Estimator
 from hardwall.model.estimators import kalman
@@ -16,7 +15,7 @@ from hardwall.model.estimators.count_kalman import START, STEPS, Design
 from hardwall.model.estimators.edge_kalman_design import LEVELS
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import CAMPAIGN, SAMPLES, parameters, simulate
-from hardwall.testing.accelerations import follow, model
+from hardwall.testing.estimators import follow, model
 from stimuli.lengths import some_of
 from stimuli.papers_signal import axis_at, swing
 from stimuli.seeded import seeded

@@ -14,8 +14,7 @@ from hardwall.hdl.estimators.edge_kalman import Estimator
 from hardwall.model.estimators import edge_kalman
 from hardwall.model.estimators.edge_kalman_design import START
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
-from hardwall.testing.accelerations import OUTPUTS, follow, model
-from hardwall.testing.estimators import names
+from hardwall.testing.estimators import follow, model, names, outputs
 from stimuli.decoder_outputs import Scale
 from stimuli.lengths import some_of
 from stimuli.seeded import seeded
@@ -140,7 +139,7 @@ async def outputs_change_with_valid_alone(dut):
         while True:
             await RisingEdge(dut.clk)
             await ReadOnly()
-            now = tuple(int(getattr(dut, name).value) for name in OUTPUTS)
+            now = tuple(int(getattr(dut, name).value) for name in outputs(d))
             assert before in (None, now) or dut.valid.value == 1, f"{before} becomes {now} without valid"
             before = now
             shown.add(now[-1])
@@ -186,7 +185,7 @@ def test_model_is_the_exact_equation_rounded_as_documented(name):
     rows = list(rows_of(d, 6000))
     seen, oracle = model(d, rows, START), Oracle(d)
     for k, row in enumerate(rows):
-        assert oracle.step(row) == tuple(seen[name][k] for name in OUTPUTS), f"sample {k}: {row}"
+        assert oracle.step(row) == tuple(seen[name][k] for name in outputs(d)), f"sample {k}: {row}"
 
 
 # ---- promises -------------------------------------------------------------------------------------------------------

@@ -10,8 +10,7 @@ from hardwall.model.encoder import scale_map
 from hardwall.model.estimators import edge_kalman
 from hardwall.model.estimators.edge_kalman_design import START
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, simulate
-from hardwall.testing.accelerations import OUTPUTS, model
-from hardwall.testing.estimators import momentary, names
+from hardwall.testing.estimators import model, momentary, names, outputs
 from stimuli.decoder_outputs import Scale
 from stimuli.lengths import some_of
 from stimuli.seeded import seeded
@@ -70,11 +69,11 @@ async def follows_model(dut):
         bench.drive(map_write=1, map_bin=at, map_written=word)
         await RisingEdge(dut.clk)
     bench.drive(map_write=0, map_enabled=1)
-    inputs, outputs = await bench.campaign(
+    inputs, seen = await bench.campaign(
         "strobe",
         "valid",
         names(d),
-        (*OUTPUTS, "map_outside"),
+        (*outputs(d), "map_outside"),
         rows(d, SAMPLES // 4),
         momentary=momentary(d),
     )
@@ -83,16 +82,16 @@ async def follows_model(dut):
     counts = (inputs.column("seen__count") + inputs.column("seen__down") + half) % (2 * half) - half
     params = d.scale.params(d.errors)
     expected["map_outside"] = np.array([scale_map.place_of(params, count).outside for count in counts.tolist()])
-    check(inputs, outputs, expected, component.latency)
+    check(inputs, seen, expected, component.latency)
     assert set(expected["map_outside"]) == {0, 1}
     # The map matters, and without its gate it does not.
     assert np.any(expected["velocity"] != model(Mapped(**parameters()), inputs.rows, START)["velocity"])
     bench.drive(map_enabled=0)
-    inputs, outputs = await bench.campaign("strobe", "valid", names(d), OUTPUTS, rows(d, 2000), momentary=momentary(d))
+    inputs, seen = await bench.campaign("strobe", "valid", names(d), outputs(d), rows(d, 2000), momentary=momentary(d))
     # What the filter knows from before is forgotten by a restart.
     first = int(np.argmax(inputs.column("restart")))
     unmapped = model(Mapped(**parameters()), inputs.rows[first:], START)
-    check(inputs, outputs, {key: np.append(outputs.column(key)[:first], unmapped[key]) for key in unmapped})
+    check(inputs, seen, {key: np.append(seen.column(key)[:first], unmapped[key]) for key in unmapped})
 
 
 @pytest.mark.parametrize("name", some_of(["mhz", "narrow"], 0))
@@ -111,5 +110,5 @@ def test_errors_of_whole_counts_are_counts_that_are_moved(name):
     at = [min(max((row[0] + row[7] - d.scale.first) >> BIN_BITS, 0), bins - 1) for row in every]
     plain = [(row[0] + int(moved[here]), *row[1:]) for row, here in zip(every, at, strict=True)]
     found, expected = model(d, every, START), model(Mapped(name), plain, START)
-    assert {name: found[name].tolist() for name in OUTPUTS} == {name: expected[name].tolist() for name in OUTPUTS}
+    assert {name: found[name].tolist() for name in found} == {name: expected[name].tolist() for name in expected}
     assert np.any(found["velocity"] != model(Mapped(name), every, START)["velocity"])

@@ -6,8 +6,7 @@ from fractions import Fraction
 import cocotb
 import numpy as np
 import pytest
-from accelerated import equals
-from filters import SECONDS, impulse, norms, rms, run, starts_afresh
+from filters import SECONDS, equals, impulse, norms, rms, run, starts_afresh
 from lowest_sums import BRINKS, brink
 from scipy.linalg import solve_discrete_are
 
@@ -19,8 +18,7 @@ from hardwall.model.estimators.kalman import FLOAT_START, START, Design, Gains, 
 from hardwall.model.estimators.riccati import INDEX_MAX
 from hardwall.model.velocity_estimator import run as run_both
 from hardwall.testing import CAMPAIGN, SAMPLES, parameters, rng, simulate
-from hardwall.testing.accelerations import follow, model
-from hardwall.testing.estimators import reset_words
+from hardwall.testing.estimators import follow, model, reset_words
 from stimuli.lengths import some_of
 from stimuli.papers_signal import BOUND, RATES, axis_at, swing
 from stimuli.seeded import seeded

@@ -14,8 +14,7 @@ from hardwall.model.estimators import levant_edge
 from hardwall.model.estimators.bursts import NOTHING, watch
 from hardwall.model.estimators.levant_edge_design import LEARN_SHIFT, START
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
-from hardwall.testing.accelerations import OUTPUTS, follow, model
-from hardwall.testing.estimators import names, reset_words
+from hardwall.testing.estimators import follow, model, names, outputs, reset_words
 from stimuli.decoder_outputs import Scale
 from stimuli.lengths import some_of
 from stimuli.seeded import seeded
@@ -249,7 +248,7 @@ def test_model_is_the_exact_equation_rounded_as_documented(name):
     rows = list(stimulus(d, 6000))
     seen, oracle = model(d, rows, START), Oracle(d)
     for k, row in enumerate(rows):
-        assert oracle.step(row) == tuple(seen[name][k] for name in OUTPUTS), f"sample {k}: {row}"
+        assert oracle.step(row) == tuple(seen[name][k] for name in outputs(d)), f"sample {k}: {row}"
 
 
 # ---- promises -------------------------------------------------------------------------------------------------------

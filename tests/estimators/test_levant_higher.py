@@ -22,7 +22,7 @@ from hardwall.model.estimators.levant_higher import Filtering2, Filtering3, Orde
 from hardwall.model.estimators.levant_higher_design import LAMBDA, Design, State
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
-from hardwall.testing.accelerations import follow, model
+from hardwall.testing.estimators import follow, model
 from stimuli.lengths import some_of
 from stimuli.papers_signal import axis_at, swing
 from stimuli.seeded import seeded

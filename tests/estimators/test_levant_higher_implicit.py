@@ -21,7 +21,7 @@ from hardwall.model.estimators.levant_higher_design import LAMBDA, MEAN_ERROR, S
 from hardwall.model.estimators.levant_higher_implicit import LARGEST_L, Design, FloatParams, Order2, Order3
 from hardwall.model.runtime.compiled import compiled
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
-from hardwall.testing.accelerations import follow, model
+from hardwall.testing.estimators import follow, model
 from stimuli.lengths import some_of
 from stimuli.papers_signal import axis_at, swing
 from stimuli.specs import spec

@@ -21,6 +21,7 @@ from hardwall.model.axis.monitors import POSITION_WRAP, VELOCITY_LIMIT
 from hardwall.model.encoder import quadrature
 from hardwall.model.encoder.quadrature import Seen
 from hardwall.model.estimators import registry
+from hardwall.model.estimators.acceleration import Velocities
 from hardwall.model.estimators.estimate import EstimatorDesign
 from hardwall.model.estimators.levant_higher_design import LAMBDA
 from hardwall.model.runtime.compiled import compiled
@@ -108,7 +109,7 @@ def settled(axis: Axis, seen: Seen, start: int) -> Settled:
     samples, d = len(seen.count), axis.design.estimator
     velocity = np.zeros(samples, np.float64 if axis.floating else np.int64)
     flags = np.zeros(samples, np.int64)
-    run(axis.params.estimator, d.start(axis.floating), seen, np.zeros(samples, np.int64), velocity, flags)
+    run(axis.params.estimator, d.start(axis.floating), seen, np.zeros(samples, np.int64), Velocities(velocity), flags)
     rest, unit = velocity[start:], Fraction(1) if axis.floating else Fraction(1, 2**d.velocity.f)
     total = Fraction(math.fsum(rest)) if axis.floating else Fraction(sum(map(int, np.add.reduceat(rest, [0]))))
     ends = (Fraction(end.item()) * unit for end in (rest.min(), rest.max()))
@@ -331,7 +332,7 @@ def _flags_at_rest(d: EstimatorDesign, words: tuple[int, ...]) -> list[str]:
     """Return the flags that are up at rest, with run-time words."""
     params, rest = d.params(dict(zip((word.name for word in d.words), words, strict=True))), np.zeros(8, np.int64)
     velocity, flags = np.zeros(8, np.int64), np.zeros(8, np.int64)
-    run(params, d.start(), Seen(*[rest] * len(Seen._fields)), rest, velocity, flags)
+    run(params, d.start(), Seen(*[rest] * len(Seen._fields)), rest, Velocities(velocity), flags)
     return [flag for bit, flag in enumerate(d.flags) if np.bitwise_and.reduce(flags) >> bit & 1]
 
 

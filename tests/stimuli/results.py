@@ -162,7 +162,7 @@ def responses() -> response.Responses:
         for counts, gain in ((0.5, 0.0), (10.0, 0.9), (100.0, 1.0 / scale))
         for hz in (70.0, 200.0)
     ]
-    return response.Responses(rows, load("seed-2011"))
+    return response.Responses(rows, "seed-2011")
 
 
 def costs_of_boards() -> costs.Costs:
