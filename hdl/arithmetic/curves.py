@@ -1,17 +1,14 @@
 """Curves of a magnitude that are powers in the end, from its leading bits."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal
-from amaranth.lib.wiring import In, Member, Out
+from amaranth.hdl import Cat, Mux, Signal
 
 from hardwall.model.arithmetic.curves import Design
 
-from ..block import Block
 from ..wires import port
-from .fixed import shape
-from .powers import entry_of, leading, times
+from .powers import Powers, entry_of, leading, times
 
 
-class Curves(Block):
+class Curves(Powers):
     """The terms 2^k F(a 2^-k) of a magnitude a.
 
     Equation: D is log2 of the leading bit, less k and the number of the first octave. Below 0 a term is a multiple of
@@ -30,34 +27,15 @@ class Curves(Block):
 
     Members
     -------
-    start : In(1)
-        Pulse: take `size`.
-    size : In
-        The magnitude, unsigned; constant from `start` to `done`.
-    octaves : In
-        k, signed, within the design's; constant.
-    term_0, term_1, ... : Out
-        The terms in the order of the design's, unsigned.
-    done : Out(1)
-        High in the clock in which the terms of a start are ready.
+    As of `Powers`; `size` is constant from `start` to `done`.
 
     Source: the model's module names it.
     """
 
     design_class = Design
 
-    @staticmethod
-    def members(design: Design) -> dict[str, Member]:
-        terms = {f"term_{number}": Out(width) for number, width in enumerate(design.widths)}
-        ports = {"start": In(1), "size": In(design.width), "octaves": In(shape(design.octave_format))}
-        return {**ports, **terms, "done": Out(1)}
-
-    def elaborate(self, platform):
-        m = Module()
+    def _read(self, m):
         design, params = self.design, self.design.params
-        run = Signal(design.latency)
-        m.d.sync += run.eq(Cat(self.start, run[:-1]))
-        m.d.comb += self.done.eq(run[-1])
         octave, step, empty = leading(m, design, self.size, self.octaves, design.lowest)
         near = Signal()
         if design.near:
@@ -81,4 +59,3 @@ class Curves(Block):
                 place = int(params.places[number]) - params.fraction - 1
                 read = Mux(near, double << place if place >= 0 else double >> -place, read)
             m.d.sync += port(self, f"term_{number}").eq(read)
-        return m

@@ -53,11 +53,15 @@ class Powers(Block):
 
     def elaborate(self, platform):
         m = Module()
-        design = self.design
-        run = Signal(design.latency)
+        run = Signal(self.design.latency)
         m.d.sync += run.eq(Cat(self.start, run[:-1]))
         m.d.comb += self.done.eq(run[-1])
+        self._read(m)
+        return m
 
+    def _read(self, m: Module) -> None:
+        """Describe the way from the magnitude to the terms."""
+        design = self.design
         octave, step, empty = leading(m, design, self.size, self.octaves)
         quotient, rest = self._divided(m, octave)
         entry = Cat(step, rest)
@@ -72,7 +76,6 @@ class Powers(Block):
                 down.eq(most - amount),
             ]
             m.d.sync += port(self, f"term_{number}").eq((value << most if most > 0 else value >> -most) >> down)
-        return m
 
     def _divided(self, m: Module, octave: Signal) -> tuple[Value, Value]:
         """Return quotient and rest of an octave by the degree."""

@@ -55,13 +55,13 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ..arithmetic import curves
-from ..arithmetic.fixed import shift_floor, shift_round_half_up, wrap
+from ..arithmetic.fixed import shift_round_half_up, wrap
 from ..runtime.compiled import compiled
 from . import levant_higher_design
 from .acceleration import acceleration_of
 from .estimate import estimate
 from .levant import sign_of
-from .levant_higher import held
+from .levant_higher import acceleration, float_acceleration, held
 from .levant_higher_design import LAMBDA, OCTAVES, WIDEST, State
 
 LARGEST_L = 1.0
@@ -248,13 +248,5 @@ def float_step(params, state, seen, restart):
     return State(1, seen.count, 0.0, lead, z1, z2, z3), z1, 0
 
 
-@acceleration_of.register(Params)
-@compiled
-def acceleration(params, state):
-    return shift_floor(state.z2, params.acceleration_shift)
-
-
-@acceleration_of.register(FloatParams)
-@compiled
-def float_acceleration(params, state):
-    return state.z2
+acceleration_of.register(Params)(acceleration)
+acceleration_of.register(FloatParams)(float_acceleration)

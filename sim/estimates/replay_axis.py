@@ -89,6 +89,7 @@ def run(
     if progress:
         progress(len(counts))
     if isinstance(made, Motions):
+        # The record of an axis has no acceleration: the estimator runs once more, alone.
         run_estimator(axis.params.estimator, design.start(axis.floating), centred, made)
     else:
         made = Velocities(record.velocity)

@@ -3,12 +3,12 @@
 from fractions import Fraction
 
 import cocotb
-import numpy as np
 import pytest
+from terms import follow, magnitudes, widths_are_needed
 
 from hardwall.hdl.arithmetic.powers import Powers
 from hardwall.model.arithmetic.powers import MANTISSA_BITS, STEPS, Design, Term, term
-from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, parameters, simulate
 from stimuli.lengths import some_of
 
 DESIGNS = {
@@ -19,15 +19,6 @@ DESIGNS = {
     "fine": Design(12, 12, 3, (Term(1, 900.0, 0),), (-4, -1)),
 }
 every = pytest.mark.parametrize("name", DESIGNS)
-
-
-def magnitudes(design: Design, samples: int) -> list[int]:
-    """Return magnitudes at and beside every power of two, and of every length."""
-    top = (1 << design.width) - 1
-    edges = {each for n in range(design.width + 1) for each in ((1 << n) - 1, 1 << n, (1 << n) + 1)}
-    steps = {(STEPS + m << n) + each for n in range(design.width - 4) for m in range(STEPS) for each in (-1, 0)}
-    drawn = (rng().integers(0, 1 << 62, samples) >> rng().integers(62 - design.width, 62, samples)).tolist()
-    return [each for each in sorted(edges | steps) if 0 <= each <= top] + drawn
 
 
 @every
@@ -54,28 +45,12 @@ def test_no_term_is_further_from_the_exact_power_than_derived(name):
 
 @every
 def test_widths_are_needed(name):
-    design = DESIGNS[name]
-    top, octaves = (1 << design.width) - 1, range(design.octaves[0], design.octaves[1] + 1)
-    for number, width in enumerate(design.widths):
-        assert max(term(design.params, number, top, k) for k in octaves).bit_length() == width
+    widths_are_needed(DESIGNS[name], term)
 
 
 @cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
-    design = DESIGNS[parameters()["name"]]
-    component = Powers(design)
-    bench = Bench(dut, component)
-    await bench.reset()
-    sizes = magnitudes(design, SAMPLES // 20)
-    octaves = [*range(design.octaves[0], design.octaves[1] + 1)]
-    rows = [(size, k) for k in octaves for size in sizes]
-    names = [f"term_{number}" for number in range(len(design.terms))]
-    starts, terms = await bench.campaign("start", "done", ("size", "octaves"), names, rows, momentary=("size",))
-    expected = {
-        name: np.array([term(design.params, number, size, k) for size, k in starts.rows])
-        for number, name in enumerate(names)
-    }
-    check(starts, terms, expected, component.latency)
+    await follow(dut, Powers(DESIGNS[parameters()["name"]]), term, momentary=("size",))
 
 
 @pytest.mark.parametrize("name", some_of([*DESIGNS], 2, 3))

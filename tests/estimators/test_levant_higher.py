@@ -37,6 +37,7 @@ LIMIT = "limit"
 """An axis of so large a jerk that L is `LARGEST_L`, and no word raises it."""
 AXES = ["paper", "mhz", "narrow", TIGHT, LIMIT]
 every = pytest.mark.parametrize("name", NAMES)
+every_form = pytest.mark.parametrize("name", [*NAMES, "levant-2-implicit", "levant-3-implicit"])
 START = State(0, 0, 0, 0, 0, 0, 0)
 
 
@@ -255,10 +256,10 @@ def test_a_saturation_is_left_again(name):
     assert abs(record.velocity[-1] * d.velocity.lsb - 0.05) < 0.002
 
 
-@every
+@every_form
 @pytest.mark.parametrize("rate", [1_000, 10_000, 100_000, 1_000_000])
-def test_word_length_and_rough_powers_cost_a_hundredth(name, rate):
-    """The RMS error on the paper's signal, over phases, in fixed point and in float64."""
+def test_word_length_and_rough_terms_cost_a_hundredth(name, rate):
+    """The RMS error on the paper's signal, over phases, in fixed point and in float64; of the implicit form two."""
     of, seconds = axis_at(name, rate), 8.0 if rate == 1_000 else 1.0
     squares = np.zeros(2)
     for phase in np.arange(4) / 4:
@@ -267,16 +268,16 @@ def test_word_length_and_rough_powers_cost_a_hundredth(name, rate):
             error = Axis(of, floating).run(counts).velocity_m_per_s - truth
             squares[way] += (error[int(0.4 * rate) :] ** 2).sum()
     exact, fixed = np.sqrt(squares)
-    assert abs(fixed - exact) <= 0.01 * exact
+    assert abs(fixed - exact) <= (0.02 if "implicit" in name else 0.01) * exact
 
 
-@every
+@every_form
 def test_every_flag_is_raised_by_something(name):
     d = design(name, TIGHT)
     assert np.bitwise_or.reduce(model(d, wrapped(d, stimulus(d, 20_000)), START)["saturated"]) == 0b111
 
 
-@every
+@every_form
 def test_wrap_and_restart(name):
     of = axis_at(name, 10_000)
     d = of.design.estimator

@@ -21,7 +21,7 @@ from hardwall.model.estimators.levant_higher_design import LAMBDA, MEAN_ERROR, S
 from hardwall.model.estimators.levant_higher_implicit import LARGEST_L, Design, FloatParams, Order2, Order3
 from hardwall.model.runtime.compiled import compiled
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
-from hardwall.testing.estimators import follow, model
+from hardwall.testing.estimators import follow
 from stimuli.lengths import some_of
 from stimuli.papers_signal import axis_at, swing
 from stimuli.specs import spec
@@ -225,41 +225,6 @@ def test_no_stop_start_or_reversal_of_the_axis_saturates(name, axis):
         for part in range(1, 10) if hold > 5 * tau else ():
             end = record.velocity[(part + 1) * hold - 1] * d.velocity.lsb
             assert abs(end - speeds[(part + 1) * hold - 1]) <= 0.02 * speed + 8 / tau
-
-
-@every
-@pytest.mark.parametrize("rate", [1_000, 10_000, 100_000, 1_000_000])
-def test_word_length_and_rough_tables_cost_two_hundredths(name, rate):
-    """The RMS error on the paper's signal, over phases, in fixed point and in float64."""
-    of, seconds = axis_at(name, rate), 8.0 if rate == 1_000 else 1.0
-    squares = np.zeros(2)
-    for phase in np.arange(4) / 4:
-        counts, truth = swing(rate, seconds, TURN_S, phase)
-        for way, floating in enumerate((True, False)):
-            error = Axis(of, floating).run(counts).velocity_m_per_s - truth
-            squares[way] += (error[int(0.4 * rate) :] ** 2).sum()
-    exact, fixed = np.sqrt(squares)
-    assert abs(fixed - exact) <= 0.02 * exact
-
-
-@every
-def test_every_flag_is_raised_by_something(name):
-    d = design(name, TIGHT)
-    assert np.bitwise_or.reduce(model(d, wrapped(d, stimulus(d, 20_000)), START)["saturated"]) == 0b111
-
-
-@every
-def test_wrap_and_restart(name):
-    of = axis_at(name, 10_000)
-    d = of.design.estimator
-    counts, _ = swing(of.sample_hz, 0.2, TURN_S)
-    half = 1 << (d.count_width - 1)
-    expected = Axis(of).run(counts).velocity
-    assert expected.any()
-    assert (Axis(of).run(counts + half - counts[0] - 1000).velocity == expected).all()
-    rows = [(count, int(k == 700), 0) for k, count in enumerate(counts.tolist())]
-    again = model(d, rows[700:], START)["velocity"]
-    assert (model(d, rows, START)["velocity"][700:] == again).all()
 
 
 def test_the_largest_bound_is_the_largest():
