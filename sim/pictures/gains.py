@@ -30,11 +30,16 @@ def draw(search: Search) -> Figure:
     panels = picture.subplots(len(ROWS), len(search.maps), sharex=True, sharey=True)
     colours = mpl.colormaps["viridis"].with_extremes(bad="0.8")
     # The areas in place are never larger than these.
-    largest = max(np.nanmax(search.areas(output, in_place=False)) for output in search.maps) / 1e3 or 1.0
+    found = [search.areas(output, False) for output in search.maps]
+    found += [search.between(output, False)[:, 2] for output in search.maps]
+    largest = np.nanmax(np.concatenate([areas.ravel() for areas in found])) / 1e3 or 1.0
     for row, (in_place, text) in zip(panels, ROWS.items(), strict=True):
         for axes, output in zip(row, search.maps, strict=True):
             area = search.areas(output, in_place) / 1e3
-            mesh = axes.pcolormesh(search.lambdas, search.alphas, area, cmap=colours, vmin=0, vmax=largest)
+            scale = {"cmap": colours, "vmin": 0, "vmax": largest}
+            mesh = axes.pcolormesh(search.lambdas, search.alphas, area, **scale)
+            lambdas, alphas, between = search.between(output, in_place).T
+            axes.scatter(lambdas, alphas, 9, between / 1e3, edgecolors="white", linewidths=0.3, **scale)
             axes.grid(visible=False)
             axes.set_xscale("log")
             axes.set_yscale("log")

@@ -1,8 +1,10 @@
 """A full search of Levant's gains: area of the stable region over lambda and alpha, for both outputs.
 
 The gains are spaced in equal ratios around the founding paper's: lambda = sqrt(C) and alpha = 1.1 C, with C the bound
-on the acceleration. Pairs without derivable words are left out. The paper's two pairs and the best pairs of the search
-are then mapped again in finer steps: the best of hundreds of coarse maps owes some of its area to chance.
+on the acceleration. Pairs without derivable words are left out. The areas lie on narrow ridges, along which lambda^2 /
+alpha is constant, and the grid passes between their tops. So the highest hills of the grid are climbed, in steps that
+are halved. The paper's two pairs and the best pairs of all are then mapped again in finer steps of the walls: the best
+of hundreds of coarse maps owes some of its area to chance.
 
 The sufficient condition for convergence is alpha > C and lambda^2 >= 4 C (alpha + C) / (alpha - C).
 
@@ -13,9 +15,11 @@ the stable walls whose handle is also in place (`hit.Hit.in_place`).
 """
 
 from dataclasses import asdict, dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import maximum_filter
 
 from ...model.estimators.levant import Design, Gains
 from ...model.runtime.result import Table, table_of
@@ -33,6 +37,10 @@ LAMBDAS = np.geomspace(0.3, 100, 16)
 """The values of lambda, as multiples of sqrt(C)."""
 ALPHAS = np.geomspace(0.03, 300, 17)
 """The values of alpha, as multiples of C."""
+HILLS = 3
+"""The number of hills that are climbed for each output: the highest, by the area in place."""
+HALVINGS = 3
+"""How often the steps of a climb are halved; the first are half of the grid's."""
 COARSER, FINER = 4.0, 2.0
 """The steps of the search's maps and of the final maps, as multiples of the scene's steps."""
 PAPERS = ("proposed", "adjusted")
@@ -53,7 +61,8 @@ class Search:
     Attributes:
         scene: the scene as it was searched.
         lambdas, alphas: the gains that were tried, ascending, m^(1/2)/s and m/s^2.
-        maps: maps in coarse steps, by output and gains; gains without derivable words are left out.
+        maps: maps of the grid, in coarse steps, by output and gains; gains without derivable words are left out.
+        climbed: further maps in coarse steps, between the grid's gains, in the same form.
         picks: the paper's gains and the best gains, by output and name.
         effort: effort of the maps.
     """
@@ -62,6 +71,7 @@ class Search:
     lambdas: np.ndarray
     alphas: np.ndarray
     maps: dict[str, dict[Gains, Map]]
+    climbed: dict[str, dict[Gains, Map]]
     picks: dict[str, dict[str, Pick]]
     effort: Effort
 
@@ -80,6 +90,14 @@ class Search:
         maps = self.maps[output]
         rows = [[maps.get(Gains(lam, alpha)) for lam in self.lambdas.tolist()] for alpha in self.alphas.tolist()]
         return np.array([[_area(a_map, in_place) if a_map else np.nan for a_map in row] for row in rows])
+
+    def between(self, output: str, in_place: bool) -> np.ndarray:
+        """Return the gains between the grid's with their areas, shape (pairs, 3): lambda, alpha and N^2 s/m^2."""
+        rows = [
+            (gains.lambda_sqrt_m_per_s, gains.alpha_m_per_s2, _area(a_map, in_place))
+            for gains, a_map in self.climbed[output].items()
+        ]
+        return np.array(rows).reshape(-1, 3)
 
     def at_edge(self, gains: Gains) -> bool:
         """Return whether gains are at the edge of the tried range: better gains may lie beyond."""
@@ -117,7 +135,16 @@ class Search:
             }
             for name, pick in self.picks[output].items()
         }
-        return {"area_n2_s_per_m2": rows(False), "area_in_place_n2_s_per_m2": rows(True), "picks": picks}
+        between = [
+            {**asdict(gains), "area_n2_s_per_m2": each.area, "area_in_place_n2_s_per_m2": each.area_in_place}
+            for gains, each in self.climbed[output].items()
+        ]
+        return {
+            "area_n2_s_per_m2": rows(False),
+            "area_in_place_n2_s_per_m2": rows(True),
+            "between": between,
+            "picks": picks,
+        }
 
     def _picks(self) -> list[tuple[str, str, Pick]]:
         return [(output, name, pick) for output, picks in self.picks.items() for name, pick in picks.items()]
@@ -175,16 +202,53 @@ def study(case: Case, mapper: Mapper) -> Search:
         possible = accepted(cases)
         return dict(zip(possible, mapper(title, list(possible.values())), strict=True))
 
-    coarse = maps("search of gains", COARSER, [(output, gains) for output in Design.outputs for gains in tried])
-    by_output = {out: {gains: each for (of, gains), each in coarse.items() if of == out} for out in Design.outputs}
-    chosen = {output: papers | _best(found, bound) for output, found in by_output.items()}
+    grid = maps("search of gains", COARSER, [(output, gains) for output in Design.outputs for gains in tried])
+    found = dict(grid)
+    tops = [(output, top) for output in Design.outputs for top in _hills(grid, output, lambdas, alphas)]
+    for halving in range(1, HALVINGS + 1):
+        steps = [float(values[1] / values[0]) ** 0.5**halving for values in (lambdas, alphas)]
+        beside = {(output, top): [(output, gains) for gains in _beside(top, *steps)] for output, top in tops}
+        new = dict.fromkeys(pair for pairs in beside.values() for pair in pairs if pair not in found)
+        if new:
+            found |= maps(f"the highest hills, {halving} of {HALVINGS}", COARSER, list(new))
+        tops = [max(filter(found.get, (top, *beside[top])), key=lambda pair: found[pair].area_in_place) for top in tops]
+
+    by_output = {out: {gains: each for (of, gains), each in found.items() if of == out} for out in Design.outputs}
+    chosen = {output: papers | _best(every, bound) for output, every in by_output.items()}
     pairs = dict.fromkeys((output, gains) for output in Design.outputs for gains in chosen[output].values())
     finer = maps("the best again, in finer steps", FINER, list(pairs))
     picks = {
         output: {name: Pick(gains, finer[output, gains]) for name, gains in named.items() if (output, gains) in finer}
         for output, named in chosen.items()
     }
-    return Search(next(iter(finer.values())).case.scene, lambdas, alphas, by_output, picks, mapper.effort())
+    of_grid, between = (
+        {
+            output: {gains: each for gains, each in every.items() if ((output, gains) in grid) is on_grid}
+            for output, every in by_output.items()
+        }
+        for on_grid in (True, False)
+    )
+    scene = next(iter(finer.values())).case.scene
+    return Search(scene, lambdas, alphas, of_grid, between, picks, mapper.effort())
+
+
+def _hills(grid: dict[tuple[str, Gains], Map], output: str, lambdas: np.ndarray, alphas: np.ndarray) -> list[Gains]:
+    """Return the gains of the highest hills of an output, by the area in place: none beside them has more."""
+    pairs = [Gains(lam, alpha) for lam, alpha in product(lambdas.tolist(), alphas.tolist())]
+    areas = [grid[output, gains].area_in_place if (output, gains) in grid else 0.0 for gains in pairs]
+    ground = np.array(areas).reshape(len(lambdas), len(alphas))
+    tops = ((ground > 0) & (ground == maximum_filter(ground, 3))).ravel()
+    highest = sorted(np.flatnonzero(tops).tolist(), key=lambda place: -areas[place])
+    return [pairs[place] for place in highest[:HILLS]]
+
+
+def _beside(top: Gains, lambda_step: float, alpha_step: float) -> list[Gains]:
+    """Return the eight pairs about a pair of gains, a step away in either gain or in both."""
+    return [
+        Gains(top.lambda_sqrt_m_per_s * lambda_step**east, top.alpha_m_per_s2 * alpha_step**north)
+        for east, north in product((-1, 0, 1), repeat=2)
+        if east or north
+    ]
 
 
 def _area(each: Map, in_place: bool) -> float:

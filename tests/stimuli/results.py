@@ -218,7 +218,9 @@ def search() -> gains.Search:
     papers = {"proposed": Gains(12**0.5, 13.2), "adjusted": Gains(250**0.5, 50.0)}
     named = papers | dict.fromkeys(("best", "best within the condition"), pairs[-2]) | {"best in place": pairs[8]}
     picks = {name: gains.Pick(pair, map_of("adjusted", 4e4, 180)) for name, pair in named.items()}
-    return gains.Search(scene, lambdas, alphas, {"u": own, "u1": own}, {"u": picks, "u1": picks}, NOTHING)
+    between = {Gains(5.0, 8.0): map_of("adjusted", 5e4, 180)}
+    of_grid, between, picks = ({"u": each, "u1": each} for each in (own, between, picks))
+    return gains.Search(scene, lambdas, alphas, of_grid, between, picks, NOTHING)
 
 
 def dropped() -> Drop:

@@ -2,6 +2,8 @@
 
 import json
 import math
+from dataclasses import asdict, astuple
+from itertools import product
 
 import numpy as np
 import pytest
@@ -47,6 +49,12 @@ def hill(output: str, lam: float, alpha: float) -> float:
     return (2 if output == "u" else 1) * 1e4 / (1 + math.log(lam / 5) ** 2 + math.log(alpha / 200) ** 2)
 
 
+def ridge(_: str, lam: float, alpha: float) -> float:
+    """Return the height of a ridge where lambda^2 is 2 alpha, a tenth wide, with its top at lambda 3; the grid of the
+    search passes it by."""
+    return 1e4 / (1 + (10 * math.log(lam**2 / (2 * alpha))) ** 2) / (1 + math.log(lam / 3) ** 2)
+
+
 def nearest(values: np.ndarray, value: float) -> float:
     return float(values[np.abs(np.log(values / value)).argmin()])
 
@@ -65,16 +73,47 @@ def test_the_best_of_a_known_hill_are_found(searched):
         assert picks["best"] == Gains(top, nearest(search.alphas, 200))
         # The next lambda above 2 sqrt(C), where the condition can be met, and an alpha high enough to meet it.
         assert picks["best within the condition"].lambda_sqrt_m_per_s == search.lambdas[search.lambdas > 48**0.5][0]
-        assert picks["best in place"] == Gains(top, float(search.alphas[search.alphas < 20][-1]))
+        # The grid's best in place was climbed, up to the alpha from which on the known maps have nothing in place.
+        low = picks["best in place"]
+        assert abs(math.log(low.lambda_sqrt_m_per_s / 5)) < math.log(search.lambdas[1] / search.lambdas[0]) / 8
+        assert 20 > low.alpha_m_per_s2 > 20 * (search.alphas[0] / search.alphas[1]) ** (1 / 8)
         papers = [(each.lambda_sqrt_m_per_s, each.alpha_m_per_s2) for each in (picks["proposed"], picks["adjusted"])]
         assert papers == [pytest.approx((12**0.5, 13.2)), pytest.approx((250**0.5, 50.0))]
 
 
+def test_a_narrow_ridge_between_the_grid_s_gains_is_found():
+    search = gains.study(Case.of("seed-2011"), Areas(ridge))
+    for output in ("u", "u1"):
+        best = search.picks[output]["best in place"]
+        lam, alpha = best.gains.lambda_sqrt_m_per_s, best.gains.alpha_m_per_s2
+        assert lam**2 / alpha == pytest.approx(2, rel=0.03)
+        assert best.map.area_in_place > 1.3 * np.nanmax(search.areas(output, in_place=True))
+        between = search.between(output, in_place=True)
+        assert between[between[:, 2].argmax()].tolist() == [lam, alpha, best.map.area_in_place]
+        assert len(between) == len(search.climbed[output]) > gains.HALVINGS
+
+
+def test_the_highest_hills_are_apart():
+    heights = [[9, 8, 1, 0], [8, 1, 1, 1], [1, 1, 7, 1], [1, 1, 1, 1], [6, 1, 1, 5], [1, 1, 1, 1]]
+    lambdas, alphas = np.geomspace(2, 8, len(heights)), np.geomspace(1, 10, len(heights[0]))
+    known, grid = Areas(lambda _, lam, alpha: heights[_at(lambdas, lam)][_at(alphas, alpha)]), {}
+    for pair in product(lambdas.tolist(), alphas.tolist()):
+        levant = {"controller.output": "u", "controller.gains.levant": asdict(Gains(*pair))}
+        grid["u", Gains(*pair)] = known.map_of(Case.of("seed-2011").changed(levant))
+    hills = gains._hills(grid, "u", lambdas, alphas)
+    assert [(_at(lambdas, lam), _at(alphas, alpha)) for lam, alpha in map(astuple, hills)] == [(0, 0), (2, 2), (4, 0)]
+
+
+def _at(values: np.ndarray, value: float) -> int:
+    return values.tolist().index(value)
+
+
 def test_the_picks_are_mapped_again_in_finer_steps(searched):
     search, known = searched
-    coarse, finer = ({case.scene.zwidth.stiffness_step_n_per_m for case in call} for call in known.calls)
-    assert (coarse, finer) == ({4e3}, {2e3})
-    assert {case.label for case in known.calls[1]} == {
+    *coarse, finer = ({case.scene.zwidth.stiffness_step_n_per_m for case in call} for call in known.calls)
+    assert coarse == [{4e3}] * (1 + gains.HALVINGS)
+    assert finer == {2e3}
+    assert {case.label for case in known.calls[-1]} == {
         pick.map.case.label for picks in search.picks.values() for pick in picks.values()
     }
 
@@ -145,6 +184,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
         assert areas.shape == (2, 2)
         assert areas.max() > 0
         assert (np.array(output["area_in_place_n2_s_per_m2"]) <= areas).all()
+        assert all(each["area_in_place_n2_s_per_m2"] <= each["area_n2_s_per_m2"] for each in output["between"])
         assert {"proposed", "adjusted", "best", "best in place"} <= set(output["picks"])
     text = picture.read_text()
     wanted = (
