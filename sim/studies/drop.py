@@ -28,7 +28,7 @@ from ..scene.case import Case, accepted
 from ..scene.errors import SceneError
 from ..scene.schema import Scene
 from ..walls import hit
-from ..walls.chatter import at_rest
+from ..walls.chatter import at_rest, force_every
 from ..walls.grid import wider_grid
 from ..walls.mapping import Mapper
 from ..walls.methods import PROPOSED, Curve, methods
@@ -151,9 +151,7 @@ def _changes(scene: Scene, curve: Curve) -> dict[tuple[str, str], dict[str, Any]
             gains = {**curve.gains, gain: curve.gains[gain] * times}
             changes[factor, f"x {times:g}"] = replace(curve, gains=gains).changes
     for samples in SAMPLES_A_FORCE:
-        rate = samples * scene.controller.actuation_hz
-        clock = rate * round(scene.controller.clock_hz / rate)
-        changes["samples a force", f"{samples}"] = {"controller.sample_hz": rate, "controller.clock_hz": clock}
+        changes["samples a force", f"{samples}"] = force_every(scene, samples)
     return changes
 
 

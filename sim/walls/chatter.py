@@ -68,6 +68,13 @@ class Chatter:
         return np.minimum(swing, out)
 
 
+def force_every(scene: Scene, samples: int) -> dict[str, int]:
+    """Return changes of a scene, by dotted key: the force follows every so many samples, at the same rate of forces."""
+    rate = samples * scene.controller.actuation_hz
+    clock = rate * round(scene.controller.clock_hz / rate)
+    return {"controller.sample_hz": rate, "controller.clock_hz": clock}
+
+
 def motions(scene: Scene) -> np.ndarray:
     """Return the counts of motions that came to rest, shape (motions, samples); they are constant after `SETTLING_S`.
 

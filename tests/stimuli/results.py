@@ -217,7 +217,9 @@ def search() -> gains.Search:
     own = {pair: map_of("adjusted", 500 * pair.lambda_sqrt_m_per_s, 180) for pair in pairs}
     papers = {"proposed": Gains(12**0.5, 13.2), "adjusted": Gains(250**0.5, 50.0)}
     named = papers | dict.fromkeys(("best", "best within the condition"), pairs[-2]) | {"best in place": pairs[8]}
-    picks = {name: gains.Pick(pair, map_of("adjusted", 4e4, 180)) for name, pair in named.items()}
+    picks = {
+        name: gains.Pick(pair, *(map_of("adjusted", end, 180) for end in (4e4, 1e4))) for name, pair in named.items()
+    }
     between = {Gains(5.0, 8.0): map_of("adjusted", 5e4, 180)}
     of_grid, between, picks = ({"u": each, "u1": each} for each in (own, between, picks))
     return gains.Search(scene, lambdas, alphas, of_grid, between, picks, NOTHING)

@@ -93,6 +93,13 @@ def test_a_narrow_ridge_between_the_grid_s_gains_is_found():
         assert len(between) == len(search.climbed[output]) > gains.HALVINGS
 
 
+def test_a_rate_without_words_is_left_out(monkeypatch):
+    monkeypatch.setattr(gains, "force_every", lambda *_: {"controller.sample_hz": 7})
+    search = gains.study(Case.of("seed-2011"), Areas(hill))
+    assert {pick.shifted for picks in search.picks.values() for pick in picks.values()} == {None}
+    assert {row[-1] for row in search.tables()[0].rows} == {""}
+
+
 def test_the_highest_hills_are_apart():
     heights = [[9, 8, 1, 0], [8, 1, 1, 1], [1, 1, 7, 1], [1, 1, 1, 1], [6, 1, 1, 5], [1, 1, 1, 1]]
     lambdas, alphas = np.geomspace(2, 8, len(heights)), np.geomspace(1, 10, len(heights[0]))
@@ -110,9 +117,11 @@ def _at(values: np.ndarray, value: float) -> int:
 
 def test_the_picks_are_mapped_again_in_finer_steps(searched):
     search, known = searched
-    *coarse, finer = ({case.scene.zwidth.stiffness_step_n_per_m for case in call} for call in known.calls)
+    *coarse, finer, shifted = ({case.scene.zwidth.stiffness_step_n_per_m for case in call} for call in known.calls)
     assert coarse == [{4e3}] * (1 + gains.HALVINGS)
-    assert finer == {2e3}
+    assert finer == shifted == {2e3}
+    assert [{case.scene.spec.samples_per_actuation for case in call} for call in known.calls[-2:]] == [{10}, {11}]
+    assert [case.label for case in known.calls[-1]] == [case.label for case in known.calls[-2]]
     assert {case.label for case in known.calls[-1]} == {
         pick.map.case.label for picks in search.picks.values() for pick in picks.values()
     }

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from hardwall.model.axis.axis import Axis
 from hardwall.sim.scene.load import load
@@ -44,6 +45,47 @@ def test_it_is_seen_from_both_sides_where_the_force_takes_every_eleventh():
     chatter = at_rest(loaded, "float")
     assert chatter.swing_m_per_s == pytest.approx(2 * two_cycle_m_per_s(loaded))
     assert np.abs(chatter.mean_m_per_s).max() < 1e-9
+
+
+def four_cycle_m_per_s(loaded) -> tuple[float, float]:
+    """Return |u| of every second sample, and of the others, in Levant's cycle of four samples.
+
+    The errors are p, q, -p and -q, and u1 is alpha, 0, -alpha and 0. So u = alpha - l sqrt(p) = q - p at the first, and
+    -l sqrt(q) = -p - q at the second. With s = sqrt(q), p = l s - s^2.
+    """
+    gains, tau, count = loaded.controller.gains.levant, 1 / loaded.controller.sample_hz, loaded.encoder.count_m
+    lam, alpha = gains.lambda_sqrt_m_per_s * tau / math.sqrt(count), gains.alpha_m_per_s2 * tau**2 / count
+
+    def first(s: float) -> float:
+        return alpha - lam * math.sqrt(lam * s - s**2) - (2 * s**2 - lam * s)
+
+    s = brentq(first, 1e-9 * lam, (1 - 1e-9) * lam)
+    return abs(2 * s**2 - lam * s) * count / tau, lam * s * count / tau
+
+
+def gained(lam: float, ratio: float, changes: dict | None = None):
+    """Return the scene with lambda and the ratio lambda^2 / alpha."""
+    pair = {"lambda_sqrt_m_per_s": lam, "alpha_m_per_s2": lam**2 / ratio}
+    return load("seed-2011", {"controller.gains.levant": pair} | (changes or {}))
+
+
+@pytest.mark.parametrize("lam", [4.0, 8.43, 12.0])
+@pytest.mark.parametrize("ratio", [2.0, 2.2, 3.0])
+def test_the_force_at_every_tenth_sample_mostly_takes_the_slow_half_of_a_cycle_of_four(lam, ratio):
+    loaded = gained(lam, ratio)
+    seen, (slow, fast) = at_rest(loaded, "float"), four_cycle_m_per_s(loaded)
+    most = np.maximum(seen.most_m_per_s, -seen.least_m_per_s)
+    quiet = most < (slow + fast) / 2
+    assert quiet.mean() > 0.5
+    assert most[quiet] == pytest.approx(slow, abs=1e-9)
+    assert most.max() == pytest.approx(fast, abs=1e-9)
+    # That half is no motion at all where lambda^2 = 2 alpha: sqrt(p) = lambda / 2 solves both equations.
+    assert (slow < 1e-9) == (ratio == 2.0)
+
+
+def test_the_force_at_every_eleventh_sample_takes_both_halves():
+    loaded = gained(8.43, 2.0, ODD)
+    assert at_rest(loaded, "float").swing_m_per_s == pytest.approx(2 * four_cycle_m_per_s(loaded)[1])
 
 
 def test_words_move_the_chatter_by_no_more_than_a_few_of_the_root_s_last_bits():
