@@ -58,7 +58,9 @@ def check_of_counts(estimator: str) -> None:
     """Raise ValueError if there is no such estimator, or it needs the edges."""
     if registry.design_of(estimator).uses_stamps():
         raise checks.FieldError(
-            "estimator", f"must be one that needs only counts, not {estimator!r}: velocity_of_edges takes the edges"
+            "estimator",
+            f"must be one that needs only counts, not {estimator!r}: velocity_of_edges and "
+            "velocity_and_acceleration_of_edges take the edges",
         )
 
 

@@ -135,10 +135,11 @@ def _name_beside(axes: Axes, maps: Sequence[Map]) -> None:
     """Write the names of many maps beside the panel, with their areas, the largest first."""
     handles, labels = axes.get_legend_handles_labels()
     order = sorted(range(len(maps)), key=lambda index: -maps[index].area)
-    axes.figure.legend(
+    axes.legend(
         [handles[index] for index in order],
         [labels[index] for index in order],
-        loc="outside right upper",
+        loc="upper left",
+        bbox_to_anchor=(1.0, 1.02),
         title="area (kN/m N s/m)",
         title_fontsize=LABEL_PT,
         frameon=False,

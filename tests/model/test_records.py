@@ -204,7 +204,7 @@ def test_what_velocity_refuses():
         velocity([1, 2], 1e3, "levant", levant_lamda=1.0, **BOUNDS)
     with pytest.raises(ValueError, match="kalman_position is no setting; accepted are none"):
         velocity([1, 2], 1e3, "fdm", kalman_position=1.0, **BOUNDS)
-    with pytest.raises(ValueError, match="velocity_of_edges takes the edges"):
+    with pytest.raises(ValueError, match="velocity_of_edges and velocity_and_acceleration_of_edges take the edges"):
         velocity([1, 2], 1e3, "period", **BOUNDS)
     with pytest.raises(ValueError, match="estimator must be one of"):
         velocity([1, 2], 1e3, "euler", **BOUNDS)
@@ -315,5 +315,5 @@ def test_an_estimator_without_an_acceleration_is_refused_in_one_call():
         velocity_and_acceleration_of_edges([0.0, 1.0], [0, 1], 1e3, "mt")
     with pytest.raises(ValueError, match=r"^estimator must be one of fdm, .*, not 'euler'$"):
         velocity_and_acceleration([0, 1], 1e3, "euler")
-    with pytest.raises(ValueError, match=r"only counts, not 'levant-edge': velocity_of_edges takes the edges"):
+    with pytest.raises(ValueError, match=r"only counts, not 'levant-edge': velocity_of_edges and"):
         velocity_and_acceleration([0, 1], 1e3, "levant-edge")

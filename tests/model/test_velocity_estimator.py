@@ -199,7 +199,7 @@ def test_a_velocity_beyond_the_bound_saturates_with_a_flag():
 
 @pytest.mark.parametrize("estimator", [name for name in ESTIMATORS if name not in OF_COUNTS])
 def test_estimators_by_edges_are_refused(estimator):
-    with pytest.raises(ValueError, match=f"only counts, not '{estimator}': velocity_of_edges takes the edges"):
+    with pytest.raises(ValueError, match=f"only counts, not '{estimator}': velocity_of_edges and"):
         VelocityEstimator(RATE, estimator, MOTION)
 
 

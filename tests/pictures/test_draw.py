@@ -330,6 +330,15 @@ def test_an_area_that_is_far_from_the_others_is_on_the_panel():
     assert low < trade.MOST < high < 2 * trade.MOST
 
 
+def test_the_names_of_many_maps_are_beside_the_panel_and_below_the_title():
+    picture = every_estimator_mapped()
+    lay_out(picture)
+    (axes,) = picture.axes
+    names, panel = axes.get_legend().get_window_extent(), axes.get_window_extent()
+    assert names.x0 >= panel.x1
+    assert names.y1 < picture._suptitle.get_window_extent().y0
+
+
 @pytest.mark.parametrize("picture", ["zwidth"], indirect=True)
 def test_the_passivity_limit_is_seen_or_said_to_be_absent(picture):
     absent = " ".join(text.get_text() for text in words(picture))
