@@ -83,6 +83,16 @@ def test_the_force_at_every_tenth_sample_mostly_takes_the_slow_half_of_a_cycle_o
     assert (slow < 1e-9) == (ratio == 2.0)
 
 
+@pytest.mark.parametrize("ratio", [2.0, 3.0])
+def test_every_second_value_of_u1_is_0_in_a_cycle_of_four(ratio):
+    seen = at_rest(gained(11.7, ratio, {"controller.output": "u1"}), "float")
+    most = np.maximum(seen.most_m_per_s, -seen.least_m_per_s)
+    assert (most < 1e-9).mean() > 0.5
+    odd = gained(11.7, ratio, ODD | {"controller.output": "u1"})
+    alpha = odd.controller.gains.levant.alpha_m_per_s2 / odd.controller.sample_hz
+    assert at_rest(odd, "float").swing_m_per_s == pytest.approx(2 * alpha)
+
+
 def test_the_force_at_every_eleventh_sample_takes_both_halves():
     loaded = gained(8.43, 2.0, ODD)
     assert at_rest(loaded, "float").swing_m_per_s == pytest.approx(2 * four_cycle_m_per_s(loaded)[1])
