@@ -18,6 +18,7 @@ Nor is being in place enough. With lambda^2 = 2 alpha the cycle has four samples
 the whole cycle. So the pairs with a name are mapped with that, too.
 """
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from itertools import product
@@ -51,6 +52,9 @@ HALVINGS = 3
 COARSER, FINER = 4.0, 2.0
 """The steps of the search's maps and of the final maps, as multiples of the scene's steps."""
 PAPERS = ("proposed", "adjusted")
+Pair = tuple[str, Gains]
+"""An output and gains."""
+Areas = dict[Pair, Map]
 
 
 @dataclass(frozen=True)
@@ -211,7 +215,7 @@ def study(case: Case, mapper: Mapper) -> Search:
     lambdas, alphas = LAMBDAS * np.sqrt(bound), ALPHAS * bound
     tried = [Gains(lam, alpha) for lam in lambdas.tolist() for alpha in alphas.tolist()]
 
-    def maps(title: str, steps: dict[str, Any], wanted: list[tuple[str, Gains]]) -> dict[tuple[str, Gains], Map]:
+    def maps(title: str, steps: dict[str, Any], wanted: list[Pair]) -> Areas:
         cases = {}
         for output, gains in wanted:
             levant = {"controller.estimator": "levant", "controller.output": output}
@@ -223,22 +227,13 @@ def study(case: Case, mapper: Mapper) -> Search:
 
     coarse, fine = (wider_grid(plain, coarser) for coarser in (COARSER, FINER))
     grid = maps("search of gains", coarse, [(output, gains) for output in Design.outputs for gains in tried])
-    found = dict(grid)
-    tops = [(output, top) for output in Design.outputs for top in _hills(grid, output, lambdas, alphas)]
-    for halving in range(1, HALVINGS + 1):
-        steps = [float(values[1] / values[0]) ** 0.5**halving for values in (lambdas, alphas)]
-        beside = {(output, top): [(output, gains) for gains in _beside(top, *steps)] for output, top in tops}
-        new = dict.fromkeys(pair for pairs in beside.values() for pair in pairs if pair not in found)
-        if new:
-            found |= maps(f"the highest hills, {halving} of {HALVINGS}", coarse, list(new))
-        tops = [max(filter(found.get, (top, *beside[top])), key=lambda pair: found[pair].area_in_place) for top in tops]
-
+    found = grid | _climbed(grid, lambdas, alphas, lambda title, wanted: maps(title, coarse, wanted))
     by_output = {out: {gains: each for (of, gains), each in found.items() if of == out} for out in Design.outputs}
     chosen = {output: papers | _best(every, bound) for output, every in by_output.items()}
     pairs = dict.fromkeys((output, gains) for output in Design.outputs for gains in chosen[output].values())
     finer = maps("the best again, in finer steps", fine, list(pairs))
     shift = force_every(plain, plain.spec.samples_per_actuation + 1)
-    shifted: dict[tuple[str, Gains], Map] = {}
+    shifted: Areas = {}
     with suppress(SceneError):  # that rate may leave the scene's axis too few clocks
         shifted = maps("and with one sample a force more", fine | shift, list(finer))
     picks = {
@@ -260,7 +255,22 @@ def study(case: Case, mapper: Mapper) -> Search:
     return Search(scene, lambdas, alphas, of_grid, between, picks, mapper.effort())
 
 
-def _hills(grid: dict[tuple[str, Gains], Map], output: str, lambdas: np.ndarray, alphas: np.ndarray) -> list[Gains]:
+def _climbed(grid: Areas, lambdas: np.ndarray, alphas: np.ndarray, maps: Callable[[str, list[Pair]], Areas]) -> Areas:
+    """Return the maps on the way to the tops of the highest hills of both outputs; `maps` makes them, by a title."""
+    found: Areas = {}
+    tops = [(output, top) for output in Design.outputs for top in _hills(grid, output, lambdas, alphas)]
+    for halving in range(1, HALVINGS + 1):
+        steps = [float(values[1] / values[0]) ** 0.5**halving for values in (lambdas, alphas)]
+        beside = {(output, top): [(output, gains) for gains in _beside(top, *steps)] for output, top in tops}
+        new = dict.fromkeys(pair for pairs in beside.values() for pair in pairs if pair not in grid | found)
+        if new:
+            found |= maps(f"the highest hills, {halving} of {HALVINGS}", list(new))
+        every = grid | found
+        tops = [max(filter(every.get, (top, *beside[top])), key=lambda pair: every[pair].area_in_place) for top in tops]
+    return found
+
+
+def _hills(grid: Areas, output: str, lambdas: np.ndarray, alphas: np.ndarray) -> list[Gains]:
     """Return the gains of the highest hills of an output, by the area in place: none beside them has more."""
     pairs = [Gains(lam, alpha) for lam, alpha in product(lambdas.tolist(), alphas.tolist())]
     areas = [grid[output, gains].area_in_place if (output, gains) in grid else 0.0 for gains in pairs]
