@@ -23,6 +23,7 @@ VIEWS: dict[str, Callable[..., list[str]]] = {
     "by-rate": accuracy.by_rate,
     "jerks": walls.jerks,
     "without-jerk": walls.without_jerk,
+    "samples": walls.samples,
     "responses": response.responses,
     "regions": walls.maps,
     "facts": walls.facts,

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from itertools import pairwise
 from typing import Any
 
+from hardwall.sim.scene.load import load
 from hardwall.sim.studies.rendered_setting import rate_text
 
 from .tables import Report, number, of_draws, table
@@ -146,6 +147,15 @@ def without_jerk(*reports: Report) -> list[str]:
 def _areas(*reports: Report) -> dict[str, list[str]]:
     """Return the areas of every method, in the order of the reports."""
     return {of[0]["label"]: [*map(_area, of)] for of in zip(*(each["maps"] for each in reports), strict=True)}
+
+
+def samples(*reports: Report) -> list[str]:
+    """Return the area of every method, a column for the samples a force of each report."""
+    scenes = [load(each["maps"][0]["scene"], each["maps"][0]["changes"]) for each in reports]
+    numbers = [f"{scene.spec.samples_per_actuation}" for scene in scenes]
+    return table(
+        [f"samples a force; {AREA}", *numbers], ([method, *areas] for method, areas in _areas(*reports).items())
+    )
 
 
 def hands(report: Report) -> list[str]:

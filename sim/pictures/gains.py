@@ -31,14 +31,14 @@ def draw(search: Search) -> Figure:
     colours = mpl.colormaps["viridis"].with_extremes(bad="0.8")
     # The areas in place are never larger than these.
     found = [search.areas(output, False) for output in search.maps]
-    found += [search.between(output, False)[:, 2] for output in search.maps]
+    found += [search.areas_between(output, False)[:, 2] for output in search.maps]
     largest = np.nanmax(np.concatenate([areas.ravel() for areas in found])) / 1e3 or 1.0
     for row, (in_place, text) in zip(panels, ROWS.items(), strict=True):
         for axes, output in zip(row, search.maps, strict=True):
             area = search.areas(output, in_place) / 1e3
             scale = {"cmap": colours, "vmin": 0, "vmax": largest}
             mesh = axes.pcolormesh(search.lambdas, search.alphas, area, **scale)
-            lambdas, alphas, between = search.between(output, in_place).T
+            lambdas, alphas, between = search.areas_between(output, in_place).T
             axes.scatter(lambdas, alphas, 9, between / 1e3, edgecolors="white", linewidths=0.3, **scale)
             axes.grid(visible=False)
             axes.set_xscale("log")

@@ -80,7 +80,7 @@ class Search:
         scene: the scene as it was searched.
         lambdas, alphas: the gains that were tried, ascending, m^(1/2)/s and m/s^2.
         maps: maps of the grid, in coarse steps, by output and gains; gains without derivable words are left out.
-        climbed: further maps in coarse steps, between the grid's gains, in the same form.
+        between: maps with gains between the grid's, likewise.
         picks: the paper's gains and the best gains, by output and name.
         effort: effort of the maps.
     """
@@ -89,7 +89,7 @@ class Search:
     lambdas: np.ndarray
     alphas: np.ndarray
     maps: dict[str, dict[Gains, Map]]
-    climbed: dict[str, dict[Gains, Map]]
+    between: dict[str, dict[Gains, Map]]
     picks: dict[str, dict[str, Pick]]
     effort: Effort
 
@@ -109,11 +109,11 @@ class Search:
         rows = [[maps.get(Gains(lam, alpha)) for lam in self.lambdas.tolist()] for alpha in self.alphas.tolist()]
         return np.array([[_area(a_map, in_place) if a_map else np.nan for a_map in row] for row in rows])
 
-    def between(self, output: str, in_place: bool) -> np.ndarray:
+    def areas_between(self, output: str, in_place: bool) -> np.ndarray:
         """Return the gains between the grid's with their areas, shape (pairs, 3): lambda, alpha and N^2 s/m^2."""
         rows = [
             (gains.lambda_sqrt_m_per_s, gains.alpha_m_per_s2, _area(a_map, in_place))
-            for gains, a_map in self.climbed[output].items()
+            for gains, a_map in self.between[output].items()
         ]
         return np.array(rows).reshape(-1, 3)
 
@@ -156,7 +156,7 @@ class Search:
         }
         between = [
             {**asdict(gains), "area_n2_s_per_m2": each.area, "area_in_place_n2_s_per_m2": each.area_in_place}
-            for gains, each in self.climbed[output].items()
+            for gains, each in self.between[output].items()
         ]
         return {
             "area_n2_s_per_m2": rows(False),
@@ -227,9 +227,9 @@ def study(case: Case, mapper: Mapper) -> Search:
 
     coarse, fine = (wider_grid(plain, coarser) for coarser in (COARSER, FINER))
     grid = maps("search of gains", coarse, [(output, gains) for output in Design.outputs for gains in tried])
-    found = grid | _climbed(grid, lambdas, alphas, lambda title, wanted: maps(title, coarse, wanted))
-    by_output = {out: {gains: each for (of, gains), each in found.items() if of == out} for out in Design.outputs}
-    chosen = {output: papers | _best(every, bound) for output, every in by_output.items()}
+    climbed = _climbed(grid, lambdas, alphas, lambda title, wanted: maps(title, coarse, wanted))
+    of_grid, between = _by_output(grid), _by_output(climbed)
+    chosen = {output: papers | _best(of_grid[output] | between[output], bound) for output in Design.outputs}
     pairs = dict.fromkeys((output, gains) for output in Design.outputs for gains in chosen[output].values())
     finer = maps("the best again, in finer steps", fine, list(pairs))
     shift = force_every(plain, plain.spec.samples_per_actuation + 1)
@@ -244,30 +244,29 @@ def study(case: Case, mapper: Mapper) -> Search:
         }
         for output, named in chosen.items()
     }
-    of_grid, between = (
-        {
-            output: {gains: each for gains, each in every.items() if ((output, gains) in grid) is on_grid}
-            for output, every in by_output.items()
-        }
-        for on_grid in (True, False)
-    )
     scene = next(iter(finer.values())).case.scene
     return Search(scene, lambdas, alphas, of_grid, between, picks, mapper.effort())
 
 
 def _climbed(grid: Areas, lambdas: np.ndarray, alphas: np.ndarray, maps: Callable[[str, list[Pair]], Areas]) -> Areas:
     """Return the maps on the way to the tops of the highest hills of both outputs; `maps` makes them, by a title."""
-    found: Areas = {}
+    every = dict(grid)
     tops = [(output, top) for output in Design.outputs for top in _hills(grid, output, lambdas, alphas)]
     for halving in range(1, HALVINGS + 1):
         steps = [float(values[1] / values[0]) ** 0.5**halving for values in (lambdas, alphas)]
-        beside = {(output, top): [(output, gains) for gains in _beside(top, *steps)] for output, top in tops}
-        new = dict.fromkeys(pair for pairs in beside.values() for pair in pairs if pair not in grid | found)
+        around = [[(output, gains) for gains in (top, *_beside(top, *steps))] for output, top in tops]
+        new = dict.fromkeys(pair for pairs in around for pair in pairs if pair not in every)
         if new:
-            found |= maps(f"the highest hills, {halving} of {HALVINGS}", list(new))
-        every = grid | found
-        tops = [max(filter(every.get, (top, *beside[top])), key=lambda pair: every[pair].area_in_place) for top in tops]
-    return found
+            every |= maps(f"the highest hills, {halving} of {HALVINGS}", list(new))
+        tops = [
+            max((pair for pair in pairs if pair in every), key=lambda pair: every[pair].area_in_place)
+            for pairs in around
+        ]
+    return {pair: each for pair, each in every.items() if pair not in grid}
+
+
+def _by_output(areas: Areas) -> dict[str, dict[Gains, Map]]:
+    return {out: {gains: each for (of, gains), each in areas.items() if of == out} for out in Design.outputs}
 
 
 def _hills(grid: Areas, output: str, lambdas: np.ndarray, alphas: np.ndarray) -> list[Gains]:

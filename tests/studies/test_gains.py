@@ -7,12 +7,15 @@ from itertools import product
 
 import numpy as np
 import pytest
+from matplotlib.collections import PathCollection
 
 from hardwall.model.estimators.levant import Gains
+from hardwall.sim.pictures.gains import draw
 from hardwall.sim.scene.case import Case
 from hardwall.sim.studies import gains
 from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.zwidth import Map
+from stimuli import results
 from stimuli.maps import Known
 from support.command_line import call
 
@@ -88,9 +91,9 @@ def test_a_narrow_ridge_between_the_grid_s_gains_is_found():
         lam, alpha = best.gains.lambda_sqrt_m_per_s, best.gains.alpha_m_per_s2
         assert lam**2 / alpha == pytest.approx(2, rel=0.03)
         assert best.map.area_in_place > 1.3 * np.nanmax(search.areas(output, in_place=True))
-        between = search.between(output, in_place=True)
+        between = search.areas_between(output, in_place=True)
         assert between[between[:, 2].argmax()].tolist() == [lam, alpha, best.map.area_in_place]
-        assert len(between) == len(search.climbed[output]) > gains.HALVINGS
+        assert len(between) == len(search.between[output]) > gains.HALVINGS
 
 
 def test_a_rate_without_words_is_left_out(monkeypatch):
@@ -98,6 +101,24 @@ def test_a_rate_without_words_is_left_out(monkeypatch):
     search = gains.study(Case.of("seed-2011"), Areas(hill))
     assert {pick.shifted for picks in search.picks.values() for pick in picks.values()} == {None}
     assert {row[-1] for row in search.tables()[0].rows} == {""}
+
+
+def test_what_a_sample_more_leaves_is_reported_and_in_the_table():
+    search = results.search()
+    assert [pick.shifted.area_in_place < pick.map.area_in_place for pick in search.picks["u"].values()] == [True] * 5
+    reported = search.report()["outputs"]["u"]["picks"]
+    for row, (name, pick) in zip(search.tables()[0].rows, search.picks["u"].items(), strict=False):
+        assert reported[name]["area_in_place_with_a_sample_more_n2_s_per_m2"] == pick.shifted.area_in_place
+        assert row[-2:] == [f"{each.area_in_place / 1e3:.0f}" for each in (pick.map, pick.shifted)]
+
+
+def test_the_picture_has_a_point_for_each_pair_between_the_grid_s():
+    search = results.search()
+    for axes, in_place in zip(draw(search).axes[:4:2], (False, True), strict=True):
+        (points,) = [each for each in axes.collections if isinstance(each, PathCollection)]
+        wanted = search.areas_between("u", in_place)
+        assert points.get_offsets().tolist() == wanted[:, :2].tolist()
+        assert points.get_array().tolist() == (wanted[:, 2] / 1e3).tolist()
 
 
 def test_the_highest_hills_are_apart():
