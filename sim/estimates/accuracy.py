@@ -1,7 +1,8 @@
 """How accurate a velocity estimator is: known motions at any rate, on any backend, against the exact derivative.
 
 Gains are the estimator's defaults for the signal's own bound C on the acceleration, unless others are given; the bound
-on the jerk is the swing's for every signal, unless another is given. The clock is the slowest multiple of the rate with
+on the jerk is the swing's for every signal, unless another is given. `kalman`, whose bound must hold at an impact too, is
+told a bound that is given alone. The clock is the slowest multiple of the rate with
 at least 50 MHz and 50 clocks a sample, enough for every estimator's path. Above 1 MHz the clock is faster than a real
 part's, so the stamps are finer too. The row reports the clock.
 """
@@ -35,6 +36,8 @@ CLOCKS = 50
 DELAY_MAX_S = 0.1
 BOUNDS = "acceleration_max_m_per_s2", "jerk_max_m_per_s3"
 """The bounds of a motion from which default gains follow."""
+UNTOLD = ("kalman",)
+"""The estimators whose bound on the jerk must hold at an impact too."""
 SCENE = "mhz"
 """The scene with the measured device; its encoder is given errors."""
 FASTEST = {"controller.speed_max_m_per_s": 0.4}
@@ -133,8 +136,10 @@ def spec_of(job: dict) -> AxisSpec:
     """
     known = signals.load(job["signal"])
     given = job.get("bounds") or {}
-    bound, jerk = (given.get(name, getattr(known, name)) for name in BOUNDS)
     name, rate = job["estimator"], job["sample_hz"]
+    bound, jerk = (given.get(bound, getattr(known, bound)) for bound in BOUNDS)
+    if name in UNTOLD:
+        jerk = given.get("jerk_max_m_per_s3")
     encoder = job.get("encoder") or {}
     if LEARNED in encoder:
         learning.check(encoder[LEARNED], name, job.get("backend", "float"))

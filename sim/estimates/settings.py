@@ -23,7 +23,7 @@ class Settings:
 
     Attributes:
         gains: the gains of the estimator, by their names, in counts and seconds; empty for its own.
-        jerk_max_counts_per_s3: bound on the jerk between impacts.
+        jerk_max_counts_per_s3: bound on the jerk between impacts; at impacts too for `kalman`.
         edge_error_max_counts: RMS error of single edges, in counts that the estimator sees.
     """
 
@@ -39,7 +39,7 @@ SECTION = "controller."
 HIGHER = tuple(f"levant-{order}{kind}" for kind in ("", "-filtering", "-implicit") for order in (2, 3))
 """The Levants whose bound is of a higher derivative than the acceleration."""
 BOUNDS = {
-    "jerk_max_counts_per_s3": (GAIN_RANGE, ("edge-kalman", "count-kalman", *HIGHER)),
+    "jerk_max_counts_per_s3": (GAIN_RANGE, ("edge-kalman", "count-kalman", "kalman", *HIGHER)),
     "edge_error_max_counts": (EDGE_ERROR_RANGE, ("edge-kalman", "count-kalman", "mt", "mt-divisionless")),
 }
 """The bounds by their keys: their ranges, and the estimators whose gains follow from them."""
