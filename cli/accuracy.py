@@ -42,7 +42,11 @@ class AccuracyOptions(ReadingOptions):
     ] = None
     jerk_max: Annotated[
         float | None,
-        typer.Option(metavar="J", help="bound that sets the gains, 1e-9 to 1e12 m/s^3", show_default="the swing's"),
+        typer.Option(
+            metavar="J",
+            help="bound that sets the gains, 1e-9 to 1e12 m/s^3",
+            show_default="the swing's; none for kalman",
+        ),
     ] = None
 
     @property
