@@ -26,11 +26,13 @@ next count. Either signal is modelled as a white one with the same power below t
                                           (rms^2 coth(tau / (2 time)) / R)^(1/4), with the acceleration's
 
 For tau -> 0 and the default gains h = tau sqrt(C/q): a bandwidth of 3464 rad/s for C = 12 m/s^2 on 1 um at any rate.
-A told jerk J. If J changes the acceleration by less than C in that time, `jerk_max_m_per_s3` says more than C does. Then
-the acceleration is the one that a jerk uniform within J, held for a time T, makes: RMS J T / sqrt(3), correlation time
-T = (4 q/J)^(1/3); the error of the count is correlated for T, too. For tau -> 0 the bandwidth is (2 J/q)^(1/3), whatever T
-is. With this T all of the model joins that of C where J changes the acceleration by C in 2 sqrt(q/C). This filter remembers no quiet time, so the
-bound has to hold at an impact too: a wall ends a motion with far more jerk than a hand.
+
+A told jerk J, `jerk_max_m_per_s3`, says more than C does if it changes the acceleration by less than C in that time.
+Then the acceleration is the one that a jerk uniform within J makes in a time T: RMS J T / sqrt(3), correlation time
+T = (4 q/J)^(1/3); the error of the count is correlated for T, too. For tau -> 0 the bandwidth is (2 J/q)^(1/3),
+whatever T is. With this T all of the model joins that of C where J changes the acceleration by C in 2 sqrt(q/C). This
+filter remembers no quiet time, so the bound has to hold at an impact too: a wall ends a motion with far more jerk than
+a hand.
 
 If quantisation were modelled as white at the sampling rate, the bandwidth would grow with the rate although no count
 comes sooner. The gains follow from h alone: `riccati.steady_state`. For small h, K = (2 h, 2 h^2, h^3).

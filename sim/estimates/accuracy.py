@@ -1,10 +1,10 @@
 """How accurate a velocity estimator is: known motions at any rate, on any backend, against the exact derivative.
 
 Gains are the estimator's defaults for the signal's own bound C on the acceleration, unless others are given; the bound
-on the jerk is the swing's for every signal, unless another is given. `kalman`, whose bound must hold at an impact too, is
-told a bound that is given alone. The clock is the slowest multiple of the rate with
-at least 50 MHz and 50 clocks a sample, enough for every estimator's path. Above 1 MHz the clock is faster than a real
-part's, so the stamps are finer too. The row reports the clock.
+on the jerk is the swing's for every signal, unless another is given. `kalman`, whose bound must hold at an impact too,
+is told only a bound that is given. The clock is the slowest multiple of the rate with at least 50 MHz and 50 clocks a
+sample, enough for every estimator's path. Above 1 MHz the clock is faster than a real part's, so the stamps are finer
+too. The row reports the clock.
 """
 
 import math
