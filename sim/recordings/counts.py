@@ -105,7 +105,7 @@ class Counts:
             return cells.astype(np.int64)
         joined = "\n".join(cells)
         if joined.count("\n") < len(cells) and _WHOLE.fullmatch(joined):
-            return np.array(list(map(int, cells)), np.int64)
+            return np.fromstring(joined, np.int64, sep="\n")
         return np.array([self._count(line, cell) for line, cell in zip(lines, cells, strict=True)], np.int64)
 
     def _count(self, line: int, text: str) -> int:

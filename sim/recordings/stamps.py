@@ -56,7 +56,7 @@ def _alike(cells: list[str]) -> tuple[np.ndarray | None, int]:
     form = rf"[+-]?\d{{1,{whole}}}" + (rf"\.\d{{{len(decimals)}}}" if point else "")
     if not re.fullmatch(rf"(?:{form}\n)*{form}", joined):
         return None, 0
-    return np.array(list(map(int, joined.replace(".", "").split("\n"))), np.int64), -len(decimals)
+    return np.fromstring(joined.replace(".", ""), np.int64, sep="\n"), -len(decimals)
 
 
 class Stamps:

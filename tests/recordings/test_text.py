@@ -1,10 +1,14 @@
-"""Text files: compressed, damaged, with lines that are too long, and columns by number."""
+"""Text files: compressed, damaged, with lines that are too long, columns by number, and both ways to read rows."""
 
 import gzip
+from unittest import mock
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from hardwall.sim.recordings import text as module
+from hardwall.sim.recordings.error import RecordingError
 from stimuli.forms import COUNTS, rows
 
 TEXT = "\n".join(["time_s,counts", *rows()]) + "\n"
@@ -71,3 +75,57 @@ def test_a_text_in_the_first_row_costs_no_sample(read):
     lines = [f"{row},{'moves' if k % 7 else 'rests'}" for k, row in enumerate(rows())]
     found = read("\n".join(lines), "2", time="1", time_unit="s")
     assert (found.counts == COUNTS).all()
+
+
+CELLS = st.sampled_from(
+    ["0", "1", "-12", "1.5", "", " ", " 7", "8 ", "a", '"9"', '"', "\t", "#", "2/3", "1,5", "\x85", "é"]
+)
+LINES = st.one_of(
+    st.tuples(CELLS, CELLS),
+    st.lists(CELLS, max_size=3).map(tuple),
+    st.sampled_from([("1", "2"), ("", ""), (" ", "")]),
+)
+
+
+def columns(path, by_row: bool) -> list | str:
+    """Return the rows that are read of a file, with their lines, or the refusal."""
+    with mock.patch.object(module, "CHUNK", 3):
+        try:
+            table = module.Text("file", path)
+            if by_row:
+                table._columns = lambda lines, places: None
+            return [
+                row for lines, cells in table.chunks([0, 1][: table.width]) for row in zip(lines, *cells, strict=True)
+            ]
+        except RecordingError as error:
+            return str(error)
+
+
+@given(
+    st.sampled_from([",", ";", "\t", " "]),
+    st.sampled_from(["", "t,x", "t x", "# t;x"]),
+    st.lists(LINES, max_size=12),
+    st.sampled_from(["", "\n", "\n\n", "\r\n"]),
+)
+def test_whole_chunks_and_single_rows_are_read_alike(tmp_path_factory, separator, above, lines, end):
+    path = tmp_path_factory.getbasetemp() / "alike.csv"
+    # Plain rows first, so that a chunk is read at once before another is read by its rows.
+    path.write_text("\n".join([above, *([separator.join("12")] * 4), *map(separator.join, lines)]) + end)
+    assert columns(path, by_row=False) == columns(path, by_row=True)
+
+
+def test_plain_rows_are_read_at_once_and_others_by_the_row(tmp_path):
+    path = tmp_path / "rows.csv"
+    for text, at_once in (
+        ("1,2\n" * 9, True),
+        ("1 2\n" * 9, True),
+        ("1,2\n" * 8 + '1,"2"\n', False),
+        ("1, 2\n" * 9, True),
+    ):
+        path.write_text(text)
+        with mock.patch.object(module.Text, "_rows", side_effect=AssertionError) as by_row:
+            try:
+                list(module.Text("file", path).chunks([0]))
+            except AssertionError:
+                assert by_row.called
+        assert by_row.called != at_once
