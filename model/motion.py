@@ -41,8 +41,8 @@ class Motion:
         travel: length of the travel, unit. The count wraps at four times this length in either direction, without a
             fault.
         jerk_max: bound on the jerk between impacts, unit/s^3; None for one that follows from the acceleration. It sets
-            default gains of `edge-kalman`, `count-kalman` and the Levants of order 2 and 3, and those of `kalman` if
-            it is given; for all but the filters of edges it has to hold at an impact too.
+            default gains of `edge-kalman`, `count-kalman` and the Levants of order 2 and 3; if it is given, of
+            `kalman` too. For all but the filters of edges it has to hold at an impact.
         edge_error: RMS error of single edges, counts; sets default gains of `edge-kalman` and `count-kalman`.
 
     Raises:

@@ -30,7 +30,7 @@ For tau -> 0 and the default gains h = tau sqrt(C/q): a bandwidth of 3464 rad/s 
 A told jerk J, `jerk_max_m_per_s3`, says more than C does if it changes the acceleration by less than C in that time.
 Then the acceleration is the one that a jerk uniform within J makes in a time T: RMS J T / sqrt(3), correlation time
 T = (4 q/J)^(1/3); the error of the count is correlated for T, too. For tau -> 0 the bandwidth is (2 J/q)^(1/3),
-whatever T is. With this T all of the model joins that of C where J changes the acceleration by C in 2 sqrt(q/C). This
+whatever T is. With this T the model joins the one of C where J changes the acceleration by C in 2 sqrt(q/C). This
 filter remembers no quiet time, so the bound has to hold at an impact too: a wall ends a motion with far more jerk than
 a hand.
 

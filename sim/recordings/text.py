@@ -26,7 +26,7 @@ ABOVE_MAX = 10**5
 """The most comments and blank lines before the first row: they are in memory."""
 GZIP = b"\x1f\x8b"
 MARKS = '"#%/'
-"""The characters of which every quote and every comment has one."""
+"""A quote has the first of these characters, a comment one of the others."""
 BEGINNINGS = tuple("#%/ \t")
 """The characters with which a comment may begin."""
 Piece = tuple[int, list[str]]
