@@ -198,7 +198,7 @@ def sources_of(command: str, report: Mapping[str, Any] = NOTHING) -> list[Path]:
     others = (*SHOWING, *(() if hardware else HARDWARE), *(() if _reads(words) else (READING,)))
     own = TREE / "cli" / f"{words[0]}.py"
     registries = {TREE / name for name in REGISTRIES}
-    waiting, seen = [own], set[Path]()
+    waiting, seen, followed = [own], set[Path](), set[str]()
     while waiting:
         file = waiting.pop()
         if file not in seen and file != TREE / OPTIONS:
@@ -207,7 +207,8 @@ def sources_of(command: str, report: Mapping[str, Any] = NOTHING) -> list[Path]:
             if chosen and file in registries:
                 seen.remove(file)
                 names = chosen
-            waiting += (found for name in names for found in _files(name))
+            waiting += (found for name in {*names} - followed for found in _files(name))
+            followed.update(names)
     # A package passes names on, and of the command line the command alone has defaults that matter.
     named = (file for file in seen if file.name != "__init__.py")
     return sorted(file for file in named if file == own or not any(file.is_relative_to(TREE / room) for room in others))
