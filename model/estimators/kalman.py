@@ -233,8 +233,16 @@ class Design(Accelerated):
         if room < 0:
             least = gains.acceleration_rms_m_per_s2 * 2.0 ** (-3 * room)
             raise FieldError(
-                "acceleration_rms_m_per_s2",
-                f"must be at least {least:g} at these rates, not {gains.acceleration_rms_m_per_s2!r}",
+                *(
+                    "acceleration_rms_m_per_s2",
+                    f"must be at least {least:g} at these rates, not {gains.acceleration_rms_m_per_s2!r}",
+                )
+                if gains != Gains.default(axis) or axis.jerk_max_m_per_s3 is None
+                else (
+                    "jerk_max_m_per_s3",
+                    f"must be at least {axis.jerk_max_m_per_s3 * 2.0 ** (-3 * room):g} at these rates, "
+                    f"not {axis.jerk_max_m_per_s3!r}",
+                )
             )
         f = axis.shrunk(min(fraction_bits(axis, RESOLUTION_BITS), room))
         fine = f + GUARD_BITS

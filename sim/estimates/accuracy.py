@@ -137,7 +137,7 @@ def spec_of(job: dict) -> AxisSpec:
     known = signals.load(job["signal"])
     given = job.get("bounds") or {}
     name, rate = job["estimator"], job["sample_hz"]
-    bound, jerk = (given.get(bound, getattr(known, bound)) for bound in BOUNDS)
+    bound, jerk = (given.get(key, getattr(known, key)) for key in BOUNDS)
     if name in UNTOLD:
         jerk = given.get("jerk_max_m_per_s3")
     encoder = job.get("encoder") or {}
@@ -253,7 +253,7 @@ def measure(
         "velocity_bits": spec.design.estimator.velocity.width,
         **_said_by_row(encoder or {}),
         "acceleration_max_mm_s2": spec.acceleration_max_m_per_s2 * 1e3,
-        "jerk_max_mm_s3": spec.jerk_bound_m_per_s3 * 1e3,
+        "jerk_max_mm_s3": spec.jerk_bound_m_per_s3 * 1e3 if estimator not in UNTOLD or spec.jerk_max_m_per_s3 else None,
         "gains": asdict(spec.design.gains),
         "flags": spec.design.flag_names(found.flags),
     }

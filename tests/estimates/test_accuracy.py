@@ -104,6 +104,18 @@ def test_gains_follow_the_bound():
     assert given["gains"] == {"jerk_m_per_s3": 3e3}
 
 
+def test_kalman_is_told_only_a_jerk_that_is_given():
+    """Its bound must hold at an impact, too, and the swing's does not."""
+    bounds = {"acceleration_max_m_per_s2": 12.0}
+    own, given = (
+        measure("kalman", "u", "steady:10", 10_000, bounds=bounds | told) for told in ({}, {"jerk_max_m_per_s3": 3.0})
+    )
+    assert own["jerk_max_mm_s3"] is None
+    assert own["gains"]["acceleration_rms_m_per_s2"] == pytest.approx(12 / math.sqrt(3))
+    assert given["jerk_max_mm_s3"] == 3e3
+    assert given["gains"]["acceleration_rms_m_per_s2"] < 0.1 * own["gains"]["acceleration_rms_m_per_s2"]
+
+
 def test_the_clock_leaves_every_estimator_its_time():
     for rate, clock in ((1_000, 50_000_000), (30_000, 50_010_000), (1_000_000, 50_000_000), (10_000_000, 500_000_000)):
         assert axis_spec("levant", rate, 12.0).clock_hz == clock

@@ -33,6 +33,16 @@ def test_gains_change_the_words_and_the_report():
     assert found.velocity_sha256 != replay(swing(), coarsen=COARSEN).velocity_sha256
 
 
+def test_a_jerk_sets_the_gains_of_kalman():
+    settings = settings_of({"controller.jerk_max_counts_per_s3": 3e6}, "kalman")
+    told, untold = (
+        replay(swing(), "kalman", None, "fixed", 1, BOUND, settings=each)
+        for each in (settings, settings_of({}, "kalman"))
+    )
+    assert told.gains["acceleration_time_s"] == pytest.approx((4 / 3e6) ** (1 / 3), rel=1e-12)
+    assert told.gains["acceleration_time_s"] > untold.gains["acceleration_time_s"]
+
+
 def test_jerk_and_edge_error_set_the_gains_that_follow_from_them():
     changes = {"controller.jerk_max_counts_per_s3": 3e6, "controller.edge_error_max_counts": 0.25}
     found = replay(swing(), "edge-kalman", None, "fixed", 1, BOUND, settings=settings_of(changes, "edge-kalman"))
