@@ -30,6 +30,7 @@ VIEWS: dict[str, Callable[..., list[str]]] = {
     "assumptions": walls.assumptions,
     "devices": walls.devices,
     "frictions": walls.frictions,
+    "conditions": walls.conditions,
     "hands": walls.hands,
     "gains": walls.gains,
     "cutoffs": walls.cutoffs,

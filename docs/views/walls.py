@@ -132,6 +132,20 @@ def _friction(report: Report) -> str:
     return f"{changes['handle.coulomb_n']:g} N" if changes["handle.coulomb_n"] else "none"
 
 
+def conditions(*reports: Report) -> list[str]:
+    """Return the area of every method, a row for the device of each report."""
+    rows = [[_condition(report), *(_area(each) for each in report["maps"])] for report in reports]
+    return table([f"device; {AREA}", *(each["label"] for each in reports[0]["maps"])], rows)
+
+
+def _condition(report: Report) -> str:
+    """Return what a table calls the device of a report: its scene, and what was changed of handle and encoder."""
+    changes = report["maps"][0]["changes"]
+    bristles = "presliding.model" in changes
+    encoder = any(key.startswith("encoder.") for key in changes)
+    return f"`{report['scene']}`" + ", on bristles" * bristles + ", errors of the encoder" * encoder
+
+
 def jerks(*reports: Report) -> list[str]:
     """Return the area of every method that has a bound on the jerk, a row for the bound of each report."""
     bounds = [number(report["maps"][0]["changes"]["controller.jerk_max_m_per_s3"], 1) for report in reports]
