@@ -50,8 +50,8 @@ class AxisRequirements:
         speed_max_m_per_s: largest speed to estimate, m/s.
         acceleration_max_m_per_s2: bound C on the acceleration, m/s^2; sets default estimator gains.
         jerk_max_m_per_s3: bound on the jerk between impacts, m/s^3; sets default gains of `edge-kalman`,
-            `count-kalman` and the Levants of order 2 and 3, and of `kalman` if it is given. None for
-            `jerk_bound_m_per_s3`.
+            `count-kalman` and the Levants of order 2 and 3, and of `kalman` if it is given. For
+            all but the filters of edges it has to hold at an impact. None for `jerk_bound_m_per_s3`.
         edge_error_max_counts: RMS error of single edges of the encoder that estimates tolerate, counts; sets default
             gains of `edge-kalman`, `count-kalman`, `mt` and `mt-divisionless`.
         force_max_n: largest drive, N.

@@ -1,6 +1,6 @@
 """Tables of maps of stable walls: `hardwall zwidth`, `cutoff`, `gains`, `drop` and `rates`."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from itertools import pairwise
 from typing import Any
 
@@ -118,8 +118,7 @@ def devices(*reports: Report) -> list[str]:
 
 def frictions(*reports: Report) -> list[str]:
     """Return the area of every method, a row for the friction of each report."""
-    rows = [[_friction(report), *(_area(each) for each in report["maps"])] for report in reports]
-    return table([f"friction; {AREA}", *(each["label"] for each in reports[0]["maps"])], rows)
+    return _by_row("friction", _friction, reports)
 
 
 def _friction(report: Report) -> str:
@@ -134,16 +133,21 @@ def _friction(report: Report) -> str:
 
 def conditions(*reports: Report) -> list[str]:
     """Return the area of every method, a row for the device of each report."""
-    rows = [[_condition(report), *(_area(each) for each in report["maps"])] for report in reports]
-    return table([f"device; {AREA}", *(each["label"] for each in reports[0]["maps"])], rows)
+    return _by_row("device", _condition, reports)
+
+
+def _by_row(what: str, name: Callable[[Report], str], reports: tuple[Report, ...]) -> list[str]:
+    """Return the area of every method, a row for each report, which is called by what it differs in."""
+    rows = [[name(report), *(_area(each) for each in report["maps"])] for report in reports]
+    return table([f"{what}; {AREA}", *(each["label"] for each in reports[0]["maps"])], rows)
 
 
 def _condition(report: Report) -> str:
     """Return what a table calls the device of a report: its scene, and what was changed of handle and encoder."""
     changes = report["maps"][0]["changes"]
-    bristles = "presliding.model" in changes
-    encoder = any(key.startswith("encoder.") for key in changes)
-    return f"`{report['scene']}`" + ", on bristles" * bristles + ", errors of the encoder" * encoder
+    bristles = ", on bristles" if "presliding.model" in changes else ""
+    encoder = f", encoder {changes['encoder.seed']} with errors" if "encoder.seed" in changes else ""
+    return f"`{report['scene']}`{bristles}{encoder}"
 
 
 def jerks(*reports: Report) -> list[str]:

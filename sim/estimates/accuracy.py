@@ -37,7 +37,7 @@ DELAY_MAX_S = 0.1
 BOUNDS = "acceleration_max_m_per_s2", "jerk_max_m_per_s3"
 """The bounds of a motion from which default gains follow."""
 UNTOLD = ("kalman",)
-"""The estimators whose bound on the jerk must hold at an impact too."""
+"""The estimators that know no jerk unless one is given: their bound must hold at an impact too."""
 SCENE = "mhz"
 """The scene with the measured device; its encoder is given errors."""
 FASTEST = {"controller.speed_max_m_per_s": 0.4}

@@ -85,7 +85,7 @@ class Text(Table):
                 yield self._chunk(range(after - len(kept), after), columns)
 
     def _columns(self, lines: list[str], places: Sequence[int]) -> list[list[str]] | None:
-        """Return the columns of lines that are plain rows; None if one is none, is wrong or has a cell that is blank.
+        """Return the columns of lines that are plain rows; None if a line is no such row, is wrong or has a blank cell.
 
         A plain row has no quote and no comment. This is the faster of two ways to read the same: a row that it does not
         take is read, or refused by its number, by `_rows`.
