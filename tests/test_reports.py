@@ -195,6 +195,21 @@ def close(text: str, value: float) -> bool:
     return float(text) == pytest.approx(value, rel=5e-2, abs=5e-3)
 
 
+def test_a_row_of_a_device_has_its_name_and_the_areas_of_its_own_report():
+    wanted = {
+        "weak-damping-3": "`seed-2011`",
+        "weak-damping-bristles": "`seed-2011`, on bristles",
+        "weak-damping-encoder-2": "`seed-2011`, encoder 2 with errors",
+        "weak-damping-drive": "`drive-2011`",
+    }
+    rows = [line.strip("| ").split(" | ") for line in views.shown([*wanted], "conditions") if line.startswith("|")][2:]
+    for (name, called), (device, *areas) in zip(wanted.items(), rows, strict=True):
+        assert device == called
+        maps = KEPT[name].report["maps"]
+        for area, of in zip(areas, maps, strict=True):
+            assert close(area.split(" (")[0].rstrip("+"), of["area_n2_s_per_m2"] / 1000)
+
+
 def test_tables_of_walls_have_the_numbers_of_their_reports():
     found = {each["label"]: each for each in KEPT["estimators-map"].report["maps"]}
     table = cells(["estimators-map"], "regions")

@@ -1,5 +1,6 @@
 """Text files: compressed, damaged, with lines that are too long, columns by number, and both ways to read rows."""
 
+import csv
 import gzip
 from unittest import mock
 
@@ -112,6 +113,13 @@ def test_whole_chunks_and_single_rows_are_read_alike(tmp_path_factory, separator
     # Plain rows first, so that a chunk is read at once before another is read by its rows.
     path.write_text("\n".join([above, *([separator.join("12")] * 4), *map(separator.join, lines)]) + end)
     assert columns(path, by_row=False) == columns(path, by_row=True)
+
+
+def test_a_cell_longer_than_csv_allows_is_refused_both_ways(tmp_path):
+    path = tmp_path / "long.csv"
+    path.write_text("1,2,3\n" * 5 + f"1,2,{'3' * (csv.field_size_limit() + 1)}\n")
+    assert columns(path, by_row=False) == columns(path, by_row=True)
+    assert "line 6: is not CSV (field larger than field limit" in columns(path, by_row=False)
 
 
 def test_plain_rows_are_read_at_once_and_others_by_the_row(tmp_path):
