@@ -233,18 +233,9 @@ class Design(Accelerated):
         if room < 0:
             least = gains.acceleration_rms_m_per_s2 * 2.0 ** (-3 * room)
             raise FieldError(
-                # Whether the bound on the jerk made these gains: it lowers the acceleration.
-                *(
-                    "jerk_max_m_per_s3",
-                    f"must be at least {axis.jerk_max_m_per_s3 * 2.0 ** (-3 * room):g} at these rates, "
-                    f"not {axis.jerk_max_m_per_s3!r}",
-                )
-                if gains == Gains.default(axis)
-                and gains.acceleration_rms_m_per_s2 < axis.acceleration_max_m_per_s2 / math.sqrt(3)
-                else (
-                    "acceleration_rms_m_per_s2",
-                    f"must be at least {least:g} at these rates, not {gains.acceleration_rms_m_per_s2!r}",
-                )
+                "acceleration_rms_m_per_s2",
+                f"must be at least {least:g} at these rates, not {gains.acceleration_rms_m_per_s2!r}; its default "
+                "follows from the bounds on the acceleration and on the jerk",
             )
         f = axis.shrunk(min(fraction_bits(axis, RESOLUTION_BITS), room))
         fine = f + GUARD_BITS
