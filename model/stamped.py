@@ -16,6 +16,7 @@ from . import checks
 from .axis import design
 from .axis.axis import Axis, Record, step
 from .encoder import quadrature
+from .estimators.acceleration import keep, room_of
 from .runtime.compiled import compiled, inlined
 
 SAMPLES_MAX = 10**9
@@ -122,13 +123,14 @@ def decode(controller, state, edges, n_edges, until):
 
 @compiled
 def _run(controller, state, timing, edges, record):
-    velocity, force, drive, flags = record
+    made, force, drive, flags = record
     first = 0
-    for k in range(len(velocity)):
+    for k in range(len(flags)):
         rest = Edges(edges.clocks[first:], edges.levels[first:])
         state, taken = sample(controller, state, rest, len(rest.clocks), design.strobe_of(timing, k))
         first += taken
-        velocity[k], force[k], drive[k], flags[k] = state.velocity, state.force, state.drive, state.flags
+        keep(made, k, state.velocity, controller.axis.estimator, state.axis.estimator)
+        force[k], drive[k], flags[k] = state.force, state.drive, state.flags
 
 
 def run(axis: Axis, edge_clocks: ArrayLike, edge_levels: ArrayLike, samples: int, level: int = 0) -> Record:
@@ -157,8 +159,9 @@ def run(axis: Axis, edge_clocks: ArrayLike, edge_levels: ArrayLike, samples: int
     checks.check_int("samples", samples, 1, SAMPLES_MAX)
     checks.check_int("level", level, 0, 3)
     number = np.float64 if axis.floating else np.int64
-    velocity, force, drive = (np.zeros(samples, number) for _ in range(3))
+    made = room_of(axis.design.estimator, (samples,), number)
+    force, drive = np.zeros(samples, number), np.zeros(samples, number)
     flags = np.zeros(samples, np.int64)
     start = controller(axis, level)
-    _run(*start, axis.design.timing, edges, (velocity, force, drive, flags))
-    return Record(axis.design, velocity, force, drive, flags)
+    _run(*start, axis.design.timing, edges, (made, force, drive, flags))
+    return Record(axis.design, made[0], force, drive, flags, *made[1:])

@@ -54,6 +54,13 @@ def fits(value: Value, bits: int) -> Value:
     return ~top.any() | top.all()
 
 
+def held(value: Value, down: int, width: int) -> Value:
+    """Return a signed value without its `down` lowest bits, held within the words of `width` bits but the least."""
+    floor, most = value[down:], (1 << width - 1) - 1
+    least = floor[width - 1] & ~floor[: width - 1].any()
+    return Mux(fits(floor, width) & ~least, floor[:width].as_signed(), Mux(value[-1], -most, most))
+
+
 def less(value: Value, bound: int) -> Value:
     """Return whether an unsigned value is less than a constant, without a chain of carries."""
     if bound >> len(value):

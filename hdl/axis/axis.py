@@ -2,22 +2,27 @@
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, signed
 from amaranth.lib import wiring
-from amaranth.lib.wiring import Component, In, Out
+from amaranth.lib.wiring import Component, In, Member, Out
 
 from hardwall.model.axis.design import ENCODER_FLAGS, GLITCH_WIDTH, ILLEGAL_WIDTH
+from hardwall.model.estimators.acceleration import Accelerated
+from hardwall.model.estimators.estimate import EstimatorDesign
 from hardwall.model.spec import AxisSpec
 
 from ..arithmetic.fixed import shape
 from ..encoder.quadrature import Quadrature
 from ..estimators.registry import block_of
-from ..wires import given, names_of, ports
+from ..wires import given, names_of, port, ports
 from .output import Output
 from .passivity import Passivity
+from .virtual_mass import VirtualMass
 from .wall import Wall
 
 
 class Axis(Component):
-    """An axis from encoder pins to drive: decoder, velocity estimator, wall, passivity if it is so made, output stage.
+    """An axis from encoder pins to drive: decoder, velocity estimator, wall, and output stage.
+
+    Between wall and output stage are a virtual mass and a passivity controller, if the spec has them.
 
     Every `spec.clocks_per_sample` clocks a strobe takes the count; `latency` clocks later the drive has changed. The
     next strobe may come before that. Then two samples are under way, and each sample's words travel with it.
@@ -65,6 +70,8 @@ class Axis(Component):
     count, sampled_count, velocity, wall_force : Out(signed)
         The live count; a sample's velocity, a clock later its count, and then its wall force. With `sampled`, all are
         of the sample of the drive.
+    acceleration : Out(signed)
+        If the estimator has one: a sample's acceleration, with its velocity.
     flags : Out
         Sticky flags, bits as in `spec.design.flags`; the encoder's flags as the samples saw them, with their velocity.
     stepped, edge_kind, edge_down : Out
@@ -118,6 +125,7 @@ class Axis(Component):
                 "count": Out(count),
                 "sampled_count": Out(count),
                 "velocity": Out(shape(design.estimator.velocity)),
+                **self._accelerations(design.estimator),
                 "wall_force": Out(shape(spec.force)),
                 "flags": Out(len(design.flags)),
                 "stepped": Out(1),
@@ -143,6 +151,11 @@ class Axis(Component):
                 "commit_pending": Out(1),
             }
         )
+
+    @staticmethod
+    def _accelerations(estimator: EstimatorDesign) -> dict[str, Member]:
+        """Return the port of an estimator's acceleration, if it has one."""
+        return {"acceleration": Out(shape(estimator.acceleration))} if isinstance(estimator, Accelerated) else {}
 
     @property
     def spec(self) -> AxisSpec:
@@ -215,6 +228,17 @@ class Axis(Component):
         self._show(m, decoder, estimator, wall, output)
 
         force, forced, acts = wall.force, wall.valid, Const(0, 0)
+        if design.mass is not None:
+            m.submodules.mass = mass = VirtualMass(design.mass)
+            m.d.comb += given(mass, {name: active[name] for name in names_of(design.mass.words)})
+            m.d.comb += [
+                mass.strobe.eq(estimator.valid),
+                mass.acceleration.eq(estimator.acceleration),
+                mass.wall_forbid_pull.eq(active["wall_forbid_pull"]),
+                mass.forced.eq(wall.valid),
+                mass.force.eq(wall.force),
+            ]
+            force, forced = mass.given, mass.valid
         if design.passivity is not None:
             m.submodules.passivity = passivity = Passivity(design.passivity)
             m.d.comb += given(passivity, {name: active[name] for name in names_of(design.passivity.words)})
@@ -225,8 +249,8 @@ class Axis(Component):
                 passivity.strobe.eq(estimator.valid),
                 passivity.velocity.eq(estimator.velocity),
                 passivity.drive.eq(output.drive),
-                passivity.forced.eq(wall.valid),
-                passivity.force.eq(wall.force),
+                passivity.forced.eq(forced),
+                passivity.force.eq(force),
             ]
             force, forced, acts = passivity.given, passivity.valid, passivity.active
         m.d.comb += [output.strobe.eq(forced), output.force.eq(force)]
@@ -243,6 +267,8 @@ class Axis(Component):
 
     def _show(self, m: Module, decoder: Quadrature, estimator: Component, wall: Wall, output: Output) -> None:
         """Give what the blocks show to the outputs."""
+        if isinstance(self._spec.design.estimator, Accelerated):
+            m.d.comb += port(self, "acceleration").eq(estimator.acceleration)
         m.d.comb += [
             self.drive.eq(output.drive),
             self.sampled.eq(output.valid),

@@ -149,7 +149,7 @@ class Board(wiring.Component):
         if self.capture:
             m.submodules.capture = capture = self.capture
             m.d.comb += [
-                *given(capture, ports(axis, CAPTURED)),
+                *given(capture, ports(axis, (*CAPTURED, *(["acceleration"] if capture.design.acceleration else [])))),
                 capture.count.eq(axis.sampled_count),
                 capture.velocity.eq(axis.velocity >> len(axis.velocity) - len(capture.velocity)),
                 capture.address.eq(link.capture_address),

@@ -20,6 +20,7 @@ from hardwall.model.register import VALUE_BITS
 
 from ..arithmetic.fixed import shape
 from ..block import Block
+from ..wires import port
 
 NO_FIRST_CONTENTS = "no_first_contents"
 """The attribute of a memory that is never read before it is written. Its Verilog then has no initial content. Only so
@@ -49,6 +50,8 @@ class Capture(Block):
         High for one clock with the changed drive of a sample.
     count, velocity, wall_force : In(SQ) The count of the last sample, and the words made of it: count and force a clock
         before `sampled`.
+    acceleration : In(SQ)
+        With `velocity`, of an estimator that has one.
     driven : In(SQ)
         The drive that is let out, a clock behind `sampled`.
     state, live : In
@@ -85,6 +88,7 @@ class Capture(Block):
             "sampled": In(1),
             "count": In(shape(design.count)),
             "velocity": In(shape(design.velocity)),
+            **({"acceleration": In(shape(design.acceleration))} if design.acceleration else {}),
             "wall_force": In(shape(design.force)),
             "driven": In(shape(design.force)),
             "state": In(2),
@@ -160,9 +164,10 @@ class Capture(Block):
         values = [Signal(VALUE_BITS, name=name) for name in ("position", "speed", "force", "marks")]
         flags = Cat(self.state, self.wall_force.any(), self.live, self.flags)
         last = Cat(Cat(self.stamp, Const(0, REGISTER_BITS))[:REGISTER_BITS], flags)
-        m.d.comb += [
-            to.eq(word) for to, word in zip(values, (self.count, self.velocity, self.driven, last), strict=True)
-        ]
+        motion = self.velocity
+        if self._design.acceleration:
+            motion = Mux(port(self, "capture_acceleration"), port(self, "acceleration"), motion)
+        m.d.comb += [to.eq(word) for to, word in zip(values, (self.count, motion, self.driven, last), strict=True)]
         lower, upper, waits = Signal(REGISTER_BITS), Signal(REGISTER_BITS), Signal(REGISTER_BITS)
         with m.Switch(step[1:]):
             for pair, value in enumerate(values):

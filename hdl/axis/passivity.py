@@ -5,7 +5,7 @@ from amaranth.lib.wiring import In, Member, Out
 
 from hardwall.model.axis.passivity import LOWER, MIDDLE, UPPER, Design
 
-from ..arithmetic.fixed import fits, length_of, shape, shift_floor
+from ..arithmetic.fixed import held, length_of, shape, shift_floor
 from ..block import Block
 from .wall import products
 
@@ -14,13 +14,6 @@ def significant_bits(value: Value) -> Value:
     """Return the number of bits of a signed value without its leading copies of the sign."""
     rest = len(value) - 1
     return length_of(value[:-1] ^ value[-1].replicate(rest)) if rest else Const(0)
-
-
-def held(value: Value, down: int, width: int) -> Value:
-    """Return a signed value without its `down` lowest bits, held within the words of `width` bits but the least."""
-    floor, most = value[down:], (1 << width - 1) - 1
-    least = floor[width - 1] & ~floor[: width - 1].any()
-    return Mux(fits(floor, width) & ~least, floor[:width].as_signed(), Mux(value[-1], -most, most))
 
 
 class Passivity(Block):

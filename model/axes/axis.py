@@ -25,11 +25,13 @@ from ..arithmetic.signed_divide import BITS_PER_CLOCK
 from ..axis.axis import Record, run
 from ..axis.design import Timing
 from ..axis.designed import DesignedAxis
+from ..axis.virtual_mass import FIELD
 from ..checks import FieldError, check_int
 from ..drive import registry
 from ..drive.pdm import USUAL
 from ..drive.stage import Stage, StageDesign
 from ..encoder.quadrature import ILLEGAL, WRAPPED
+from ..estimators.acceleration import Velocities
 
 AXES_MAX = 32
 """The most axes of one pipeline."""
@@ -89,6 +91,8 @@ class AxesSpec(DesignedAxis):
             raise FieldError("passivity", "must be False: axes that share their logic have no such controller")
         if self.coupling:
             raise FieldError("coupling", "must be False: axes that share their logic have no moving surfaces")
+        if self.virtual_mass_max_kg is not None:
+            raise FieldError(FIELD, "must be None: axes that share their logic have no acceleration")
         if self.estimator not in PIPELINES:
             raise FieldError("estimator", f"must be one of {', '.join(PIPELINES)}, not {self.estimator!r}")
         if self.clocks_per_sample < self.slots:
@@ -183,6 +187,6 @@ class Axes:
         faults = wrapped * WRAPPED | outrun * ILLEGAL
         velocity, force, drive, flags = (np.zeros(lanes.shape, np.int64) for _ in range(4))
         for lane, params in enumerate(self.params):
-            made = velocity[lane], force[lane], drive[lane], flags[lane]
+            made = Velocities(velocity[lane]), force[lane], drive[lane], flags[lane]
             run(params, self.design.start(), lanes[lane], faults[lane], *made)
         return Record(self.design, velocity, force, drive, flags)

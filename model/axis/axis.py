@@ -1,4 +1,4 @@
-"""One axis, from counts to drive: estimator, wall, passivity and output stage, wired as the hardware wires them.
+"""One axis, from counts to drive: estimator, wall, mass, passivity and output stage, wired as the hardware wires them.
 
 For studies in Python, `Axis` takes and returns numpy arrays and SI units:
 
@@ -16,9 +16,10 @@ from numpy.typing import ArrayLike
 
 from .. import checks
 from ..encoder import quadrature
+from ..estimators.acceleration import Accelerated, keep, part, room_of
 from ..estimators.estimate import estimate
 from ..runtime.compiled import compiled, inlined
-from . import output, passivity, wall
+from . import output, passivity, virtual_mass, wall
 from .design import Design, Params, State
 from .designed import DesignedAxis
 
@@ -39,8 +40,10 @@ def step(
     """
     estimator, velocity, estimator_flags = estimate(params.estimator, state.estimator, seen, restart)
     force = wall.render(params.wall, seen.count, velocity)
+    acceleration = virtual_mass.sensed(params.mass, params.estimator, estimator)
+    borne = virtual_mass.weighed(params.mass, acceleration, force)
     observed, given, acted = passivity.step(
-        params.passivity, state.passivity, seen.count, restart, velocity, force, state.output.drive
+        params.passivity, state.passivity, seen.count, restart, velocity, borne, state.output.drive
     )
     driven, output_flags = output.step(params.output, state.output, given, enable and not fault)
     flags = state.flags | fault | estimator_flags << params.estimator_bit
@@ -49,16 +52,18 @@ def step(
 
 
 @compiled
-def run(params, state, counts, faults, velocity, force, drive, flags):
-    """Take a record sample by sample, fill the arrays from `velocity` on (of the same length) and return the state.
+def run(params, state, counts, faults, made, force, drive, flags):
+    """Take a record sample by sample, fill the arrays from `made` on (of the same length) and return the state.
 
     Args:
         params, state: as of `step`.
         counts, faults: the count of every sample, and the encoder's sticky flags.
-        velocity, force, drive, flags: what comes of every sample.
+        made: the room for what the estimator gives, `acceleration.Velocities` or `acceleration.Motions`.
+        force, drive, flags: what comes of every sample.
     """
     for k in range(len(counts)):
-        state, velocity[k], force[k] = step(params, state, quadrature.seen_count(counts[k]), 0, faults[k], 1)
+        state, velocity, force[k] = step(params, state, quadrature.seen_count(counts[k]), 0, faults[k], 1)
+        keep(made, k, velocity, params.estimator, state.estimator)
         drive[k] = state.output.drive
         flags[k] = state.flags
     return state
@@ -70,6 +75,7 @@ class Record:
 
     Attributes:
         velocity: words of `design.estimator.velocity`; or counts a sample (float64) if the axis is floating.
+        acceleration: words of `design.estimator.acceleration`, or counts a sample^2; None if the estimator has none.
         force, drive: force on the handle, force LSB: the wall's, and behind the output stage.
         flags: sticky flags after every sample, bits as in `design.flags`.
     """
@@ -79,11 +85,20 @@ class Record:
     force: np.ndarray
     drive: np.ndarray
     flags: np.ndarray
+    acceleration: np.ndarray | None = None
 
     @property
     def velocity_m_per_s(self) -> np.ndarray:
         lsb = 1.0 if self.velocity.dtype == np.float64 else self.design.estimator.velocity.lsb
         return self.velocity * (lsb * self.design.requirements.velocity_unit_m_per_s)
+
+    @property
+    def acceleration_m_per_s2(self) -> np.ndarray | None:
+        if self.acceleration is None or not isinstance(self.design.estimator, Accelerated):
+            return None
+        lsb = 1.0 if self.acceleration.dtype == np.float64 else self.design.estimator.acceleration.lsb
+        axis = self.design.requirements
+        return self.acceleration * (lsb * axis.velocity_unit_m_per_s * axis.sample_hz)
 
     @property
     def force_n(self) -> np.ndarray:
@@ -144,10 +159,12 @@ class Axis:
         lanes = np.atleast_2d(checked)
         faults = np.atleast_2d(wrapped * quadrature.WRAPPED | outrun * quadrature.ILLEGAL)
         number = np.float64 if self.floating else np.int64
-        velocity, force, drive = (np.zeros(lanes.shape, number) for _ in range(3))
+        made = room_of(self.design.estimator, lanes.shape, number)
+        force, drive = np.zeros(lanes.shape, number), np.zeros(lanes.shape, number)
         flags = np.zeros(lanes.shape, np.int64)
         for lane in range(len(lanes)):
             start = self.design.start(self.floating)
-            made = velocity[lane], force[lane], drive[lane], flags[lane]
-            run(self.params, start, lanes[lane], faults[lane], *made)
-        return Record(self.design, *(array.reshape(checked.shape) for array in (velocity, force, drive, flags)))
+            outputs = part(made, lane), force[lane], drive[lane], flags[lane]
+            run(self.params, start, lanes[lane], faults[lane], *outputs)
+        shaped = [array.reshape(checked.shape) for array in (made[0], force, drive, flags, *made[1:])]
+        return Record(self.design, *shaped)

@@ -4,7 +4,7 @@ A record has 8 registers of 16 bits: three values of 32 bits with the formats of
 high register first, and two single registers.
 
     0, 1  count     the count that the sample took
-    2, 3  velocity  the velocity estimated from it
+    2, 3  velocity  the velocity estimated from it; or the acceleration, with the word `capture_acceleration`
     4, 5  driven    the drive that the supervisor lets out for it
     6     flags     bits as in `Design.flags`
     7     stamp     the low bits of the number of the clock at which the flags were taken, `Design.stamp_clocks`
@@ -38,6 +38,7 @@ import numpy as np
 
 from ..arithmetic.fixed import SQ, UQ
 from ..checks import FieldError, check_int
+from ..estimators.acceleration import Accelerated
 from ..register import Kind, Register, narrowed, word_register
 from ..runtime.compiled import compiled
 from ..words import Word
@@ -73,6 +74,7 @@ class Inputs(NamedTuple):
     sampled: int = 0
     count: int = 0  # type: ignore[assignment]  # a tuple has a method of this name
     velocity: int = 0
+    acceleration: int = 0
     driven: int = 0
     wall_force: int = 0
     state: int = 0
@@ -86,6 +88,7 @@ class Inputs(NamedTuple):
     capture_level: int = 0
     capture_before: int = 0
     capture_decimation: int = 1
+    capture_acceleration: int = 0
 
 
 class State(NamedTuple):
@@ -115,7 +118,7 @@ class Record(NamedTuple):
     """The words of a record."""
 
     count: int  # type: ignore[assignment]
-    velocity: int
+    velocity: int  # or the acceleration
     driven: int
     flags: int
     stamp: int
@@ -132,6 +135,7 @@ class Design:
         spec, records: as given.
         params: for `step`.
         count, velocity, force: the formats of a record's values.
+        acceleration: the format of an acceleration in place of the velocity; None for an estimator without one.
         flags: names of a record's flags, bit 0 first.
         stamp_clocks: clocks from a sample to the stamp of its record.
         words: run-time words; all act at the next clock.
@@ -156,6 +160,8 @@ class Design:
             )
         self.count, self.force = SQ(spec.count_width, 0), spec.force
         self.velocity = narrowed(spec.design.estimator.velocity)
+        estimator = spec.design.estimator
+        self.acceleration = estimator.acceleration if isinstance(estimator, Accelerated) else None
         self.flags = (*STATE_FLAGS, *spec.design.flags)
         self.stamp_clocks = self.sampled_clocks + TAKEN_AT["flags"]
         sources = ", ".join(f"bit {bit} {name}" for bit, name in enumerate(SOURCES))
@@ -166,6 +172,9 @@ class Design:
             Word("capture_before", self.place, 1.0, "", 0, "records that are wanted before the trigger"),
             Word("capture_decimation", UQ(DECIMATION_BITS, 0), 1.0, "", 1, "samples from a record to the next", 1),
         )
+        if self.acceleration:
+            doc = "1: records have the acceleration in place of the velocity"
+            self.words = (*self.words, Word("capture_acceleration", UQ(1, 0), 1.0, "", 0, doc))
 
     @property
     def sampled_clocks(self) -> int:
@@ -229,7 +238,8 @@ def _value(inputs, pair):
         contact = int(inputs.wall_force != 0)
         flags = inputs.state | contact << 2 | inputs.live << 3 | inputs.flags << 4
         return flags, inputs.stamp & top
-    value = inputs.count if pair == 0 else inputs.velocity if pair == 1 else inputs.driven
+    motion = inputs.acceleration if inputs.capture_acceleration else inputs.velocity
+    value = inputs.count if pair == 0 else motion if pair == 1 else inputs.driven
     return value >> REGISTER_BITS & top, value & top
 
 

@@ -5,9 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..encoder import quadrature
+from ..estimators.acceleration import keep
 from ..estimators.estimate import estimate
 from ..runtime.compiled import compiled
-from . import design, output, passivity, wall
+from . import design, output, passivity, virtual_mass, wall
 
 
 class Pins(NamedTuple):
@@ -29,10 +30,12 @@ class Pins(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """The outputs of the hardware after every sample, once its drive has changed, by the same names: int64 arrays."""
+    """The outputs of the hardware after every sample, once its drive has changed, by the same names: int64 arrays.
+
+    The outputs of the estimator have their own room, of `acceleration.room_of`.
+    """
 
     drive: np.ndarray
-    velocity: np.ndarray
     wall_force: np.ndarray
     flags: np.ndarray
     actuated: np.ndarray
@@ -54,7 +57,7 @@ class UnderWay(NamedTuple):
     sampled_count: int
     restart: int
     velocity: int
-    force: int
+    force: int  # behind the virtual mass
     enable: int  # no fault was taken with it
     flags: int
     params: design.Params
@@ -77,15 +80,18 @@ def start(axis: design.Design) -> State:
 
 
 @compiled
-def _take(params, state, outputs, k):
+def _take(params, state, outputs, made, k):
     """Take sample k: return (the estimator's state, the sample under way), and store what is known of it."""
     seen = quadrature.seen(state.decoder)
     estimator, velocity, raised = estimate(params.estimator, state.axis.estimator, seen, state.restart)
     force = wall.render(params.wall, seen.count, velocity)
+    acceleration = virtual_mass.sensed(params.mass, params.estimator, estimator)
+    borne = virtual_mass.weighed(params.mass, acceleration, force)
     fault = quadrature.fault(state.decoder)
-    outputs.velocity[k], outputs.wall_force[k] = velocity, force
+    keep(made, k, velocity, params.estimator, estimator)
+    outputs.wall_force[k] = force
     flags = fault | raised << params.estimator_bit
-    return estimator, UnderWay(seen.count, state.restart, velocity, force, int(fault == 0), flags, params)
+    return estimator, UnderWay(seen.count, state.restart, velocity, borne, int(fault == 0), flags, params)
 
 
 @compiled
@@ -120,22 +126,22 @@ def _show(outputs, k, decoder):
 
 
 @compiled
-def run(controller, timing, state, pins, outputs, first, until):
-    """Run clocks `first` to `until` (not included), fill `outputs` and return the state.
+def run(controller, timing, state, pins, outputs, made, first, until):
+    """Run clocks `first` to `until` (not included), fill `outputs` and `made` and return the state.
 
     Args:
         controller: a `stamped.Controller`.
         timing: the `timing` of the axis's `Design`.
         state: the `State` before clock `first`.
         pins: `Pins`, from clock 0 on.
-        outputs: `Outputs`, from sample 0 on.
+        outputs, made: `Outputs`, and the room for what the estimator gives, from sample 0 on.
     """
     per_sample, latency = timing.clocks_per_sample, timing.latency
     overlap = design.overlap_of(timing)
     for n in range(first, until):
         now, restart, older, newer = state.axis, state.restart, state.older, state.newer
         if (n + 1) % per_sample == 0:
-            estimator, sample = _take(controller.axis, state, outputs, (n + 1) // per_sample - 1)
+            estimator, sample = _take(controller.axis, state, outputs, made, (n + 1) // per_sample - 1)
             now = design.State(estimator, now.passivity, now.output, now.flags)
             restart, older, newer = 0, newer, sample
         # The strobes whose drive has changed before this edge, and behind it.

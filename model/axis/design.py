@@ -4,14 +4,16 @@ from itertools import accumulate, chain
 from typing import NamedTuple
 
 from ..arithmetic.fixed import UQ
+from ..checks import FieldError
 from ..encoder import quadrature
 from ..encoder.quadrature_speed import GLITCH_CLOCKS_MAX
 from ..estimators import registry
+from ..estimators.acceleration import Accelerated
 from ..estimators.estimate import EstimatorGains
 from ..requirements import AxisRequirements
 from ..runtime.compiled import compiled
 from ..words import Word
-from . import output, passivity, wall
+from . import output, passivity, virtual_mass, wall
 
 GLITCH_WIDTH = GLITCH_CLOCKS_MAX.bit_length()
 """Bits of the glitch filter's length."""
@@ -25,6 +27,7 @@ class Params(NamedTuple):
 
     estimator: tuple
     wall: tuple
+    mass: virtual_mass.Params | virtual_mass.FloatParams | virtual_mass.Absent
     passivity: passivity.Params | passivity.FloatParams | passivity.Absent
     output: output.Params
     estimator_bit: int
@@ -84,10 +87,12 @@ class Design:
         gains: that estimator's `Gains`, or None for its default ones.
         passive: whether a passivity observer and controller follow the wall.
         coupling: whether the wall can be a virtual coupling.
+        mass_max_kg: the largest virtual mass, kg; None without one.
 
     Attributes:
         decoder: the decoder's `quadrature.Params`.
         estimator, wall, output: the designs of the other blocks.
+        mass: the design of the virtual mass; None without one.
         passivity: the design of the passivity observer and controller; None without one.
         words: every run-time word, in the order of the hardware's ports.
         flags: names of the sticky flags, bit 0 first.
@@ -107,6 +112,7 @@ class Design:
         gains: EstimatorGains | None = None,
         passive: bool = False,
         coupling: bool = False,
+        mass_max_kg: float | None = None,
     ):
         chosen = registry.design_of(estimator)
         gains = chosen.gains_class.default(requirements) if gains is None else gains
@@ -118,6 +124,7 @@ class Design:
         self.decoder = quadrature.Params(requirements.count_width, requirements.stamp_width, ILLEGAL_WIDTH)
         self.estimator = chosen(requirements, gains)
         self.wall = wall.Design(requirements, self.estimator.velocity, coupling)
+        self.mass = self._mass(mass_max_kg)
         self.passivity = passivity.Design(requirements, self.estimator.velocity) if passive else None
         self.output = output.Design(requirements)
         self.words = (
@@ -133,6 +140,7 @@ class Design:
             Word("encoder_invert", UQ(1, 0), 1.0, "", 0, "1: count the other way"),
             *self.estimator.words,
             *self.wall.words,
+            *(self.mass.words if self.mass else ()),
             *(self.passivity.words if self.passivity else ()),
             *self.output.words,
         )
@@ -144,17 +152,30 @@ class Design:
                 f"estimator must take {self.wall.lead} clocks or more, as the wall's lead does, "
                 f"not {self.estimator.latency}"
             )
-        if self.passivity and self.wall.latency < self.passivity.behind:
-            raise ValueError(
-                f"wall must take {self.passivity.behind} clocks or more before a passivity controller, "
-                f"not {self.wall.latency}"
-            )
-        self.force_to_drive = (self.passivity.latency if self.passivity else 0) + self.output.latency
+        for block, name in ((self.mass, "virtual mass"), (self.passivity, "passivity controller")):
+            if block and self.wall.latency < block.behind:
+                raise ValueError(
+                    f"wall must take {block.behind} clocks or more before a {name}, not {self.wall.latency}"
+                )
+        self.force_to_drive = sum(block.latency for block in (self.mass, self.passivity, self.output) if block)
         behind = self.wall.latency + self.force_to_drive
         self.latency_to_drive = self.estimator.latency + behind
         self.interval = max(self.estimator.interval, self.wall.interval, self.output.interval, behind + 1)
         per_sample = requirements.clocks_per_sample
         self.timing = Timing(per_sample, per_sample - 1, self.latency_to_drive)
+
+    def _mass(self, most_kg: float | None) -> virtual_mass.Design | None:
+        """Return the design of the virtual mass, for an estimator that has an acceleration."""
+        if most_kg is None:
+            return None
+        if not isinstance(self.estimator, Accelerated):
+            known = ", ".join(name for name, kind in registry.ESTIMATORS.items() if issubclass(kind, Accelerated))
+            raise FieldError(
+                virtual_mass.FIELD,
+                f"must be None with the estimator {self.estimator.name}, which has no acceleration; "
+                f"these have: {known}",
+            )
+        return virtual_mass.Design(self.requirements, self.estimator.acceleration, most_kg)
 
     def encode(self, **si: float) -> dict[str, int]:
         """Return every run-time word by name: converted from the SI value where one is given, else its reset word.
@@ -171,19 +192,28 @@ class Design:
 
     def params(self, words: dict[str, int]) -> Params:
         """Return the integer kernel's parameters."""
-        controller = self.passivity.params(words) if self.passivity else passivity.ABSENT
-        blocks = self.estimator.params(words), self.wall.params(words), controller, self.output.params(words)
-        return Params(*blocks, *self._flag_bits)
+        return Params(
+            self.estimator.params(words),
+            self.wall.params(words),
+            self.mass.params(words) if self.mass else virtual_mass.ABSENT,
+            self.passivity.params(words) if self.passivity else passivity.ABSENT,
+            self.output.params(words),
+            *self._flag_bits,
+        )
 
     def float_params(self, words: dict[str, int], si: dict[str, float]) -> Params:
         """Return the float64 kernel's parameters: gains unrounded, as given in `si` by the name of their word."""
         selected = self.estimator.outputs[words.get(self.estimator.output_word(), 0)]
+        mass: virtual_mass.FloatParams | virtual_mass.Absent = virtual_mass.ABSENT
+        if self.mass:
+            mass = self.mass.float_params(si.get("wall_mass", 0.0), si.get("free_mass", 0.0), words)
         controller: passivity.FloatParams | passivity.Absent = passivity.ABSENT
         if self.passivity:
             controller = self.passivity.float_params(si.get("passivity_damping", 0.0))
         return Params(
             self.estimator.float_params(self.gains, selected, si),
             self.wall.float_params(si.get("wall_stiffness", 0.0), si.get("wall_damping", 0.0), words),
+            mass,
             controller,
             self.output.float_params(words),
             *self._flag_bits,

@@ -31,6 +31,7 @@ from typing import ClassVar
 
 from ..arithmetic.fixed import SQ, UQ, Format
 from ..checks import check_int, shown
+from ..estimators.acceleration import Accelerated
 from ..register import COUNTER_BITS, VALUE_BITS, Kind, Register, narrowed, word_register
 from ..spec import AxisSpec
 from ..words import Word
@@ -64,14 +65,14 @@ def _telemetry(spec: DesignedAxis) -> tuple[Register, ...]:
 
     Some estimators have a velocity of more than 32 bits: its register has the upper ones, rounded down.
     """
-    count, force = SQ(spec.count_width, 0), spec.force
+    count, force, estimator = SQ(spec.count_width, 0), spec.force, spec.design.estimator
     flags = ", ".join(f"bit {bit} {name}" for bit, name in enumerate(spec.design.flags))
     rows: list[tuple[str, Format, float, str, str]] = [
         ("drive", force, spec.force_resolution_n, "N", "The force on the handle that the axis asks for."),
         ("count", count, spec.count_m, "m", "The position of the encoder."),
         (
             "velocity",
-            narrowed(spec.design.estimator.velocity),
+            narrowed(estimator.velocity),
             spec.velocity_unit_m_per_s,
             "m/s",
             "The velocity estimated at the last sample.",
@@ -89,6 +90,10 @@ def _telemetry(spec: DesignedAxis) -> tuple[Register, ...]:
         for edge in ("rise", "fall"):
             meaning = f"The stamp of the last {edge} of the encoder's pin {pin.upper()}."
             rows.append((f"stamp_{pin}_{edge}", stamp, second, "s", meaning))
+    if isinstance(estimator, Accelerated):
+        meaning = "The acceleration estimated at the last sample."
+        unit = spec.velocity_unit_m_per_s * spec.sample_hz
+        rows.append(("acceleration", estimator.acceleration, unit, "m/s^2", meaning))
     return tuple(Register(name, Kind.STATUS, fmt, said, si, unit) for name, fmt, si, unit, said in rows)
 
 

@@ -52,6 +52,17 @@ class Motions(NamedTuple):
     acceleration: np.ndarray
 
 
+def room_of(estimator: EstimatorDesign, shape: tuple[int, ...], number: type) -> Velocities | Motions:
+    """Return room for all that an estimator gives, of one shape: words (np.int64), or float64."""
+    kind = Motions if isinstance(estimator, Accelerated) else Velocities
+    return kind(*(np.zeros(shape, number) for _ in kind._fields))
+
+
+def part(made: Velocities | Motions, which: int | slice) -> Velocities | Motions:
+    """Return the room of some samples, or of a lane."""
+    return type(made)(*(each[which] for each in made))
+
+
 @by_type
 def keep(made, k, velocity, params, state):
     """Write the outputs of sample k into `made`.

@@ -17,13 +17,12 @@ import numpy as np
 import scipy
 
 from ...model.encoder.level import level
-from ...model.estimators.acceleration import Motions, Velocities
+from ...model.estimators.acceleration import Motions, Velocities, part, room_of
 from ...model.record_axis import DECODER_CLOCKS
 from ...model.spec import AxisSpec
 from ...model.stamped import Edges
-from ..loop.backends import opened
+from ..loop.backends import number_of, opened
 from ..recordings.recording import EdgeRecord
-from .outputs import part, room_for
 from .playback import CHUNK, take_all
 
 CLOCK_MAX_HZ = 100e6
@@ -111,15 +110,15 @@ def run_edges(
     # An edge at the time of a sample is the last that is counted at its strobe. Rounding moves none beyond it.
     clocks = np.ceil(edges.ticks / edges.tick_hz * rate_hz * timing.clocks_per_sample * (1 - 1e-15)).astype(np.int64)
     passed = Edges(clocks + (timing.strobe - DECODER_CLOCKS), level(edges.counts))
-    made = room_for(spec, backend, samples)
+    made = room_of(spec.design.estimator, (samples,), number_of(backend))
     with opened(spec, backend, spec.design.estimator.choose(output), int(level(edges.start)), short=True) as axis:
         state, taken = axis.state, 0
         # A call with no samples compiles the function, outside the measured time.
-        take_all(axis.controller, state, timing, passed, taken, 0, part(made, 0, 0))
+        take_all(axis.controller, state, timing, passed, taken, 0, part(made, slice(0)))
         began = time.perf_counter()
         for first in range(0, samples, CHUNK):
             last = min(first + CHUNK, samples)
-            some = part(made, first, last)
+            some = part(made, slice(first, last))
             state, taken = take_all(axis.controller, state, timing, passed, taken, first, some)
             if progress:
                 progress(last)

@@ -1,26 +1,8 @@
-"""What an estimator gives at every sample, in arrays: velocities, and accelerations where it has them.
+"""What an estimator gives at every sample, in arrays: velocities, and accelerations where it has them."""
 
-An axis in hardware has no port for the acceleration: on the backend `rtl` there are velocities alone.
-"""
-
-import numpy as np
-
-from ...model.estimators.acceleration import Accelerated, Motions, Velocities, acceleration_of
+from ...model.estimators.acceleration import Motions, Velocities
 from ...model.runtime.compiled import by_type, compiled
-from ...model.spec import AxisSpec
-from ..loop.backends import number_of
-
-
-def room_for(spec: AxisSpec, backend: str, samples: int) -> Velocities | Motions:
-    """Return room for all outputs that the estimator of an axis has on a backend."""
-    both = backend != "rtl" and isinstance(spec.design.estimator, Accelerated)
-    kind = Motions if both else Velocities
-    return kind(*(np.zeros(samples, number_of(backend)) for _ in kind._fields))
-
-
-def part(made: Velocities | Motions, first: int, last: int) -> Velocities | Motions:
-    """Return the room of some samples."""
-    return type(made)(*(each[first:last] for each in made))
+from ..loop.controllers import acceleration
 
 
 def scaled(made: Velocities | Motions, units: tuple[float, ...]) -> Velocities | Motions:
@@ -49,4 +31,4 @@ def _write_velocity(made, k, controller, state):
 @compiled
 def _write_motion(made, k, controller, state):
     made.velocity[k] = state.velocity
-    made.acceleration[k] = acceleration_of(controller.axis.estimator, state.axis.estimator)
+    made.acceleration[k] = acceleration(controller, state)

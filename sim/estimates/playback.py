@@ -12,19 +12,19 @@ import numpy as np
 
 from ...model.axis.design import change_of, strobe_of
 from ...model.encoder import scale_map
-from ...model.estimators.acceleration import Motions, Velocities
+from ...model.estimators.acceleration import Motions, Velocities, room_of
 from ...model.record_axis import DECODER_CLOCKS
 from ...model.runtime.compiled import compiled, inlined
 from ...model.spec import AxisSpec
 from ...model.stamped import Edges
 from ...model.velocity_estimator import units_of
-from ..loop.backends import is_exact, opened
+from ..loop.backends import is_exact, number_of, opened
 from ..loop.controllers import sample, sample_quietly
 from ..world.encoder import Encoder
 from ..world.lines import Lines
 from ..world.scale import Scale
 from .motions import Encoded, encoded
-from .outputs import room_for, scaled, write
+from .outputs import scaled, write
 from .signals import Signal
 
 CHUNK = 1 << 18
@@ -91,7 +91,8 @@ def outputs(
     with opened(spec, backend, parameters, passed.start_level, scale=learned) as axis:
         state = axis.state
         for first in range(0, samples, CHUNK):
-            made = room_for(spec, backend, min(CHUNK, samples - first))
+            some = min(CHUNK, samples - first)
+            made = room_of(spec.design.estimator, (some,), number_of(backend))
             state, taken = take_all(axis.controller, state, spec.design.timing, passed.edges, taken, first, made)
             yield first, scaled(made, units), int(state.flags)
 

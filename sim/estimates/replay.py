@@ -42,7 +42,7 @@ class Replay(Summary):
         gains: the gains by name, with their units.
         clock_hz: clock of the axis and of its pins; without meaning if the counts do not go through pins.
         velocity_counts_per_s: the estimate.
-        acceleration_counts_per_s2: the estimator's acceleration; None if it has none, and on `rtl`.
+        acceleration_counts_per_s2: the estimator's acceleration; None if it has none.
         difference_counts_per_s: the plain finite difference of the same counts.
         reference_counts_per_s: the zero-phase derivative of the recorded counts.
         flags: names of the sticky flags that are set at the end.

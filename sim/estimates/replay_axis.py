@@ -17,14 +17,12 @@ import numpy as np
 
 from ...model.encoder.level import level
 from ...model.estimators import registry
-from ...model.estimators.acceleration import Motions, Velocities
+from ...model.estimators.acceleration import Motions, Velocities, room_of
 from ...model.motion import ranges
 from ...model.record_axis import idle_axis
 from ...model.record_time import RecordTime
 from ...model.spec import AxisSpec
-from ...model.velocity_estimator import run as run_estimator
-from ..loop.backends import opened, whole
-from .outputs import room_for
+from ..loop.backends import number_of, opened, whole
 from .through_pins import run_pins
 
 
@@ -74,9 +72,10 @@ def run(
     Raises:
         RuntimeError: if the RTL could not be built.
     """
-    design, made = spec.design.estimator, room_for(spec, backend, len(counts))
+    design = spec.design.estimator
     choice = design.choose(output)
     if needs_pins(spec.estimator, backend):
+        made = room_of(design, counts.shape, number_of(backend))
         with opened(spec, backend, choice, int(level(0)), short=True) as (controller, state, _):
             return made, *run_pins(controller, state, spec.design.timing, counts, made, progress)
     axis = whole(spec, backend, choice)
@@ -88,9 +87,5 @@ def run(
     seconds = time.perf_counter() - began
     if progress:
         progress(len(counts))
-    if isinstance(made, Motions):
-        # The record of an axis has no acceleration: the estimator runs once more, alone.
-        run_estimator(axis.params.estimator, design.start(axis.floating), centred, made)
-    else:
-        made = Velocities(record.velocity)
+    made = Velocities(record.velocity) if record.acceleration is None else Motions(record.velocity, record.acceleration)
     return made, int(record.flags[-1]), seconds

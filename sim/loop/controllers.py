@@ -7,6 +7,7 @@ the fields `drive`, `velocity` and `flags`.
 """
 
 from ...model import stamped
+from ...model.estimators.acceleration import acceleration_of
 from ...model.runtime.compiled import by_type, compiled
 from ..rtl.c_function import call
 from ..rtl.verilated import Rtl, RtlState
@@ -30,6 +31,11 @@ def sample_quietly(controller, state, strobe):
     """Take one sample with no edges; return the state. The call passes no array, which makes it much cheaper."""
 
 
+@by_type
+def acceleration(controller, state):
+    """Return the acceleration that belongs to the velocity of a state, of a controller whose estimator has one."""
+
+
 @compiled
 def taken_off(edges, n_edges, taken):
     """Move the edges after the first `taken` to the front; return their number."""
@@ -44,8 +50,20 @@ sample.register(stamped.Controller)(stamped.sample)
 sample_quietly.register(stamped.Controller)(stamped.sample_quietly)
 
 
+@acceleration.register(stamped.Controller)
+@compiled
+def _acceleration(controller, state):
+    return acceleration_of(controller.axis.estimator, state.axis.estimator)
+
+
+@acceleration.register(Rtl)
+@compiled
+def _rtl_acceleration(controller, state):
+    return call(controller.read, controller.context, READ_ACCELERATION, 0, 0, 0)
+
+
 # The values that `read` of sim/rtl/library.cpp returns, by number.
-READ_DRIVE, READ_VELOCITY, READ_FLAGS, READ_COUNT = 0, 1, 2, 3
+READ_DRIVE, READ_VELOCITY, READ_FLAGS, READ_COUNT, READ_ACCELERATION = 0, 1, 2, 3, 4
 
 
 @compiled

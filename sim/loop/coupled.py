@@ -136,6 +136,7 @@ def _moved_model(controller, tool):
     blocks = design.Params(
         axis.estimator,
         surface,
+        axis.mass,
         axis.passivity,
         axis.output,
         axis.estimator_bit,

@@ -223,8 +223,10 @@ int64_t axis_read(int64_t context_address, int64_t what, int64_t, int64_t, int64
             return extend(context.axis.velocity, VELOCITY_WIDTH);
         case 2:
             return context.axis.flags;
-        default:
+        case 3:
             return SAMPLED_COUNT;
+        default:
+            return ACCELERATION;
     }
 }
 

@@ -12,6 +12,7 @@ from amaranth.lib.wiring import In
 from ...hdl.axis.axis import Axis
 from ...hdl.export import to_netlist, to_verilog
 from ...model.encoder import quadrature
+from ...model.estimators.acceleration import Accelerated
 from ...model.runtime.stages import logger
 from ...model.spec import AxisSpec
 from . import resting, shared_library
@@ -24,7 +25,8 @@ SHIM = Path(__file__).with_name("library.cpp")
 
 def shown_by(spec: AxisSpec) -> tuple[str, ...]:
     """Return the outputs of an axis that the compiled loop reads."""
-    return ("drive", "velocity", "flags", *(("sampled_count",) if spec.coupling else ()))
+    more = {"sampled_count": spec.coupling, "acceleration": isinstance(spec.design.estimator, Accelerated)}
+    return ("drive", "velocity", "flags", *(name for name, has in more.items() if has))
 
 
 def resting_of(spec: AxisSpec) -> Resting:
@@ -49,7 +51,9 @@ def _header(spec: AxisSpec, rest: Resting | None) -> str:
         if "$" not in name and "__" not in name
     ]
     masks = {word.name: (1 << word.format.width) - 1 for word in spec.design.words}
-    move, count = "", "0"
+    move, count, acceleration, estimator = "", "0", "0", spec.design.estimator
+    if isinstance(estimator, Accelerated):
+        acceleration = f"extend(context.axis.acceleration, {estimator.acceleration.width})"
     if spec.coupling:
         surface = {"wall_position": "position", "wall_velocity": "velocity"}
         move = " ".join(f"axis.{name} = {value} & {masks[name]};" for name, value in surface.items())
@@ -57,8 +61,9 @@ def _header(spec: AxisSpec, rest: Resting | None) -> str:
     return (
         f"#define MOVE(axis, position, velocity) {move}\n"
         f"#define SAMPLED_COUNT {count}\n"
+        f"#define ACCELERATION {acceleration}\n"
         f"#define DRIVE_WIDTH {spec.force.width}\n"
-        f"#define VELOCITY_WIDTH {spec.design.estimator.velocity.width}\n"
+        f"#define VELOCITY_WIDTH {estimator.velocity.width}\n"
         f"#define AXIS_WORDS {words}\n"
         f"#define SKIPS {int(rest is not None)}\n"
         f"#define RESTED {rest.clocks if rest else 0}\n"

@@ -12,6 +12,8 @@ from hardwall.model import stamped
 from hardwall.model.axis import clocked
 from hardwall.model.axis.design import change_of, overlap_of, strobe_of
 from hardwall.model.axis.supervised import Design
+from hardwall.model.axis.virtual_mass import FIELD
+from hardwall.model.estimators.acceleration import room_of
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
 from oracles.axis import AxisTwin
@@ -21,6 +23,8 @@ from stimuli.lengths import REACHING, WHOLE, some_of
 from stimuli.places import place
 
 PINS, OUTPUTS = clocked.Pins._fields, clocked.Outputs._fields
+MASS_KG = 0.05
+"""The largest virtual mass, where there is one."""
 LATE_BIT = 20
 """The bit of a clock's number that the others' numbers have not; the top bit where a stamp has fewer."""
 STROBES = "commit", "preload", "clear_flags", "index_arm", "origin_shift", "slip"
@@ -29,7 +33,7 @@ ACTS, CHANCES = ("", "words", "drive_enable", *STROBES), (0.958, 0.006, 0.006, *
 
 
 def make(estimator: str, overlaps: bool, parts: str) -> Axis:
-    axis = busy(estimator, **dict.fromkeys(parts.split(), True))
+    axis = busy(estimator, **{part: MASS_KG if part == FIELD else True for part in parts.split()})
     return Axis(fastest(axis) if overlaps else axis)
 
 
@@ -58,19 +62,20 @@ class Events:
         return pins
 
 
-def reference(spec: AxisSpec, pins: np.ndarray, commits: list[tuple[int, dict[str, int]]]) -> np.ndarray:
-    """Return the model's OUTPUTS of every sample; `commits` says at which strobe which words take effect."""
+def reference(spec: AxisSpec, pins: np.ndarray, commits: list[tuple[int, dict[str, int]]]) -> dict[str, np.ndarray]:
+    """Return the model's outputs of every sample, by name; `commits` says at which strobe which words take effect."""
     design = spec.design
     words = {word.name: word.reset for word in design.words}
     state = clocked.start(design)
-    out = np.zeros((len(OUTPUTS), pins.shape[1] // spec.clocks_per_sample), np.int64)
+    samples = pins.shape[1] // spec.clocks_per_sample
+    out, made = np.zeros((len(OUTPUTS), samples), np.int64), room_of(design.estimator, (samples,), np.int64)
     clock = 0
 
     def run_to(clocks: int, settings: dict[str, int], gains: dict[str, int]) -> None:
         nonlocal state, clock
         encoder = settings["encoder_glitch_clocks"], settings["encoder_invert"]
         controller = stamped.Controller(design.decoder, *encoder, design.params(gains))
-        records = clocked.Pins(*pins), clocked.Outputs(*out)
+        records = clocked.Pins(*pins), clocked.Outputs(*out), made
         state = clocked.run(controller, design.timing, state, *records, clock, clocks)
         clock = clocks
 
@@ -80,7 +85,7 @@ def reference(spec: AxisSpec, pins: np.ndarray, commits: list[tuple[int, dict[st
         run_to(strobe + 1, words, new)
         words = new
     run_to(pins.shape[1], words, words)
-    return out
+    return dict(zip(OUTPUTS, out, strict=True)) | made._asdict()
 
 
 async def motion(bench: Bench, spec: AxisSpec, samples: int, random: np.random.Generator) -> None:
@@ -144,7 +149,10 @@ async def follows_model(dut):
     await Timer(bench.period_ns // 2, "ns")
     bench.drive(rst=1)
     await Timer(2 * bench.period_ns, "ns")
-    events, seen = Events(bench), bench.monitor("sampled", *OUTPUTS)
+    events, seen = (
+        Events(bench),
+        bench.monitor("sampled", *OUTPUTS, *room_of(spec.design.estimator, (), np.int64)._fields),
+    )
     bench.drive(rst=0, drive_enable=1)
     first_clock = bench.clock_number() + 1
     commits: list[tuple[int, dict[str, int]]] = []
@@ -158,9 +166,9 @@ async def follows_model(dut):
     assert overlap_of(timing) == parameters()["overlaps"]
     pins = events.records(first_clock, change_of(timing, kept))
     expected = reference(spec, pins, commits)
-    for row, name in enumerate(OUTPUTS):
+    for name, words in expected.items():
         found = seen.column(name)[:kept]
-        wrong = np.flatnonzero(found != expected[row, :kept])
+        wrong = np.flatnonzero(found != words[:kept])
         assert not len(wrong), f"{name}: {len(wrong)} of {kept} differ, first at sample {wrong[:1]}"
     # The run must show forces in both directions, all faults of the encoder, a saturated estimator, and both limits.
     assert (seen.column("drive") > 0).any()
@@ -220,6 +228,8 @@ SIZES = [
     ("levant", True, "passivity"),
     ("levant-edge", False, "passivity coupling"),
     ("levant-edge", True, "coupling"),
+    ("kalman", False, FIELD),
+    ("levant-2", True, f"{FIELD} passivity coupling"),
 ]
 
 

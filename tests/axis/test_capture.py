@@ -42,6 +42,11 @@ def design_of(name: str, estimator: str, records: int = RECORDS) -> Design:
     return Design(spec(name, estimator), records)
 
 
+def names_of(design: Design) -> list[str]:
+    """Return the inputs that the hardware has: those of an acceleration only with an estimator that has one."""
+    return [name for name in Inputs._fields if design.acceleration or "acceleration" not in name]
+
+
 def make(name: str, estimator: str) -> Recorded:
     return Recorded(Capture(design_of(name, estimator)))
 
@@ -59,7 +64,7 @@ class World:
     def __init__(self, design: Design, seed: int):
         self.design, self.random = design, plain.Random(seed)
         self.until = 0
-        self.held = dict.fromkeys(Inputs._fields, 0) | {"capture_decimation": 1}
+        self.held = dict.fromkeys(names_of(design), 0) | {"capture_decimation": 1}
 
     def _value(self, fmt) -> int:
         return self.random.choice((fmt.min, fmt.max, 0, -1, self.random.randint(fmt.min, fmt.max)))
@@ -74,6 +79,8 @@ class World:
             held["capture_level"] = min(held["capture_level"], self.design.count.max)
         if random.random() < 0.5:
             held["capture_before"] = random.choice((0, 1, most, random.randint(0, most)))
+        if self.design.acceleration:
+            held["capture_acceleration"] = random.getrandbits(1)
         if random.random() < 0.3:
             held["capture_decimation"] = random.choice((1, 1, 2, random.randint(1, 5), random.randint(6, 255), 4095))
         elif held["capture_decimation"] > 5:
@@ -92,6 +99,8 @@ class World:
             if held["capture_decimation"] > 5 and random.random() < 0.9:
                 self.until = 1
             held["velocity"] = self._value(design.velocity)
+            if design.acceleration:
+                held["acceleration"] = self._value(design.acceleration)
             held["flags"] = random.getrandbits(len(design.spec.design.flags))
         if self.until == random.choice((1, 1, 1, 3)):
             count = held["count"] + random.choice((-1, 0, 1))
@@ -138,7 +147,7 @@ def campaign(design: Design, clocks: int, seed: int = SEED) -> tuple[dict[str, n
     for _ in range(clocks):
         given = world.act(state.capture_state)
         rows.append(given)
-        inputs = Inputs(**{name: given[name] for name in Inputs._fields})
+        inputs = Inputs(**{name: given[name] for name in names_of(design)})
         after = capture.step(design.params, memory, state, inputs)
         if after.capture_state != state.capture_state:
             happened[state.capture_state, after.capture_state, given["capture_start"]] += 1
@@ -162,7 +171,7 @@ async def follows_model(dut):
     for row in inputs.rows:
         given = dict(zip(names, row, strict=True))
         read = state.capture_state == DONE
-        seen = Inputs(**{name: given[name] for name in Inputs._fields})
+        seen = Inputs(**{name: given[name] for name in names_of(design)})
         state = capture.step(design.params, memory, state, seen)
         if given["reset"]:
             state = START._replace(data=state.data, ring=state.ring, upper=state.upper)
@@ -177,7 +186,7 @@ async def follows_model(dut):
     assert {way for way in WAYS if not happened[way]} == set()
 
 
-SIZES = [("mhz", "levant"), ("wide", "levant-adaptive"), ("narrow", "fdm")]
+SIZES = [("mhz", "levant"), ("mhz", "kalman"), ("wide", "levant-adaptive"), ("narrow", "fdm"), ("paper", "levant-3")]
 
 
 @pytest.mark.parametrize(("name", "estimator"), some_of(SIZES, 2))
@@ -188,8 +197,8 @@ def test_rtl(name, estimator):
 class Axis:
     """An axis and its capture memory in the model alone: a sample every 11 clocks, whose number is its count."""
 
-    def __init__(self, records: int = RECORDS, **words: int):
-        self.design, self.state = design_of("mhz", "levant", records), START
+    def __init__(self, records: int = RECORDS, estimator: str = "levant", **words: int):
+        self.design, self.state = design_of("mhz", estimator, records), START
         self.memory, self.clock, self.samples = self.design.memory(), 0, 0
         self.words = {"capture_decimation": 1, **words}
         self.shown = {"state": ARMED, "wall_force": 0}
@@ -200,6 +209,7 @@ class Axis:
             sampled = self.clock % 11 == 0
             self.samples += sampled
             values = {"count": self.samples, "velocity": -3 * self.samples, "driven": self.samples << 4}
+            values["acceleration"] = 5 - self.samples
             given = {**values, **self.shown, **self.words, **pulses, "sampled": int(sampled), "stamp": self.clock}
             self.state = capture.step(self.design.params, self.memory, self.state, Inputs(**given))
             self.clock, pulses = self.clock + 1, {}
@@ -238,6 +248,16 @@ def test_records_are_whole_in_order_and_around_the_trigger(before, decimation):
     # The record at the trigger's place was being taken then, or is the first one behind it.
     assert samples <= records[before].count < samples + decimation
     assert axis.state.capture_stamp == axis.clock - 11 * RECORDS * decimation - 3
+
+
+@pytest.mark.parametrize("accelerations", [0, 1])
+def test_records_have_the_acceleration_in_place_of_the_velocity(accelerations):
+    axis = Axis(estimator="kalman", capture_acceleration=accelerations)
+    axis.clocks(1, capture_start=1, capture_trigger=1)
+    axis.take(RECORDS + 1)
+    for record in axis.records():
+        motion = 5 - record.count if accelerations else -3 * record.count
+        assert (record.velocity, record.driven) == (motion, record.count << 4)
 
 
 def test_a_trigger_before_enough_records_keeps_those_there_are():

@@ -4,9 +4,10 @@ from collections import defaultdict
 from collections.abc import Callable
 from operator import attrgetter
 
-from hardwall.model.axis import output, passivity, wall
+from hardwall.model.axis import output, passivity, virtual_mass, wall
 from hardwall.model.axis.supervised import FIXED, Design
 from hardwall.model.encoder import quadrature
+from hardwall.model.estimators.acceleration import Accelerated, acceleration_of
 from hardwall.model.estimators.estimate import estimate
 
 PULSES = ("preload", "preload_count", "index_arm", "clear_flags", "origin_shift", "slip")
@@ -45,7 +46,7 @@ class AxisTwin:
         self.words = {word.name: word.reset for word in self.design.words} | self.fixed()
         self.pending = self.begun = False
         self.decoder, (self.estimator, self.passivity, self.output, _) = quadrature.START, self.design.start()
-        self.sampled_count = self.velocity = self.wall_force = self.drive = self.sticky = 0
+        self.sampled_count = self.velocity = self.acceleration = self.wall_force = self.drive = self.sticky = 0
         self.enabled = 0
         self.due: defaultdict[int, list[Callable[[], None]]] = defaultdict(list)
         self.raised: dict[int, int] = {}
@@ -74,6 +75,8 @@ class AxisTwin:
         own = dict(zip(OWN, OWN_OF(self), strict=True))
         decoded = dict(zip(DECODED, DECODED_OF(self.decoder), strict=True))
         decoded |= {"edge_kind": self.decoder.edge, "edge_down": self.decoder.down}
+        if isinstance(self.design.estimator, Accelerated):
+            own["acceleration"] = self.acceleration
         return {**own, **decoded, **NO_PULSES, **self.pulses.get(self.clocks, {}), "commit_pending": int(self.pending)}
 
     def _sample(self) -> None:
@@ -83,6 +86,10 @@ class AxisTwin:
             params.estimator, self.estimator, quadrature.seen(decoder), self.restart
         )
         force = wall.render(params.wall, decoder.count, velocity)
+        acceleration = 0
+        if isinstance(d.estimator, Accelerated):
+            acceleration = acceleration_of(params.estimator, self.estimator)
+        borne = virtual_mass.weighed(params.mass, acceleration, force)
         count, fault, restart = decoder.count, quadrature.fault(decoder), self.restart
         driven: list[int] = []
 
@@ -91,7 +98,7 @@ class AxisTwin:
 
         def drive() -> None:
             self.passivity, given, active = passivity.step(
-                params.passivity, self.passivity, count, restart, velocity, force, *driven
+                params.passivity, self.passivity, count, restart, velocity, borne, *driven
             )
             # The output stage slews from the drive, which a low enable has made zero.
             begun = self.output._replace(drive=self.drive)
@@ -104,7 +111,10 @@ class AxisTwin:
         # A result is seen `latency` edges after the strobe, so its register is loaded at the edge before.
         estimated = now + d.estimator.latency
         walled = estimated + d.wall.latency
-        self.due[estimated - 1] += [lambda: setattr(self, "velocity", velocity)]
+        self.due[estimated - 1] += [
+            lambda: setattr(self, "velocity", velocity),
+            lambda: setattr(self, "acceleration", acceleration),
+        ]
         self.due[estimated] += [lambda: setattr(self, "sampled_count", count), observe]
         self.raised[estimated] = fault | raised << params.estimator_bit
         self.pulses[estimated] = {"estimated": 1, "saturated": int(raised != 0)}

@@ -164,7 +164,8 @@ class Twin(AxisTwin):
         narrowed = self.design.estimator.velocity.width - self.captures.velocity.width
         supervisor = self.follower.supervisor
         taken = capture.Inputs(
-            **{name: asked[name] for name in CAPTURED},
+            **{name: asked[name] for name in CAPTURED if name in asked},
+            acceleration=self.acceleration,
             count=self.sampled_count,
             velocity=self.velocity >> narrowed,
             wall_force=self.wall_force,

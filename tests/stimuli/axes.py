@@ -22,7 +22,7 @@ HASTY = levant.Gains(4 * ADJUSTED.lambda_sqrt_m_per_s, 2_000.0)
 """Gains that drive a differentiator to its limits within a few samples."""
 
 
-def busy(estimator: str, **parts: bool) -> AxisSpec:
+def busy(estimator: str, **parts: bool | float) -> AxisSpec:
     """Return an axis that samples nearly as fast as its latency allows, and is moved faster than it is made for.
 
     Args:
@@ -62,6 +62,9 @@ def random_words(design: Design, random: np.random.Generator) -> dict[str, int]:
     of_all_sizes = "wall_stiffness", "wall_damping", "passivity_damping", "output_force_limit", "output_slew_limit"
     for name, top in ((word.name, word.format.max) for word in design.words if word.name in of_all_sizes):
         words[name] = int(random.integers(0, int(top * 2.0 ** -random.integers(0, 16)) + 1))
+    for word in design.mass.words if design.mass else ():
+        # Beyond the bound, too.
+        words[word.name] = int(random.integers(word.format.min, word.format.max + 1)) >> int(random.integers(0, 12))
     words["wall_position"] = int(random.integers(-30, 30))
     words["wall_left"], words["wall_forbid_pull"] = random.integers(0, 2, 2).tolist()
     if design.wall.coupling:
