@@ -53,6 +53,7 @@ COMMANDS = {
     "cutoff": "Find the best cutoff of the filter after a finite difference, by the area of the stable region.",
     "gains": "Search Levant's gains on a grid of lambda and alpha, by the area of the stable region, for both outputs.",
     "rates": "Find the stiffest stable wall by sample rate, 1 kHz to 1 MHz, and the part of the device that limits it.",
+    "mass": "Find which virtual mass is stable, by estimator, sample rate and wall, beside the theory.",
     "rendered": "Compare the stiffness and damping that a wall renders with those commanded, by frequency; and its "
     "rate-hardness.",
     "drop": "Test why Levant's stable region ends sharply at one damping, and which estimators have no such drop.",

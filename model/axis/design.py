@@ -172,8 +172,7 @@ class Design:
             known = ", ".join(name for name, kind in registry.ESTIMATORS.items() if issubclass(kind, Accelerated))
             raise FieldError(
                 virtual_mass.FIELD,
-                f"must be None with the estimator {self.estimator.name}, which has no acceleration; "
-                f"these have: {known}",
+                f"needs an estimator with an acceleration ({known}), not {self.estimator.name}",
             )
         return virtual_mass.Design(self.requirements, self.estimator.acceleration, most_kg)
 

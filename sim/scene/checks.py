@@ -2,6 +2,7 @@
 
 import math
 
+from ...model.axis.virtual_mass import FIELD
 from ...model.checks import FieldError, shown
 from ...model.encoder.quadrature_speed import max_edge_rate
 from ...model.runtime.accepted import plain
@@ -26,6 +27,9 @@ KEYS = {
     "wall_stiffness": "wall.stiffness_n_per_m",
     "wall_damping": "wall.damping_n_s_per_m",
     "passivity_damping": "passivity.damping_n_s_per_m",
+    "wall_mass": "virtual_mass.in_wall_kg",
+    "free_mass": "virtual_mass.in_free_space_kg",
+    FIELD: "virtual_mass.most_kg",
     "output_slew_limit": "controller.slew_limit_n_per_s",
     "count_m": "encoder.count_m",
 }
@@ -79,6 +83,8 @@ def _check_axis(scene: Scene) -> None:
         _check_start(scene)
         if scene.coupling is not None:
             _check_coupling(scene)
+        if scene.virtual_mass is not None:
+            _check_virtual_mass(scene)
         # A word holds more than the wall may have.
         _check_wall(scene)
         _check_words(scene)
@@ -97,6 +103,16 @@ def _check_axis(scene: Scene) -> None:
             f"encoder.edge_separation_s must be at least {rounded_up(least_s)}, the decoder's limit at this clock and "
             f"glitch_clocks, not {apart_s!r}"
         )
+
+
+def _check_virtual_mass(scene: Scene) -> None:
+    """Raise FieldError if the virtual mass may be as large as what the drive moves: no estimator is stable there."""
+    masses = {"handle.mass_kg": scene.handle.mass_kg}
+    if scene.transmission is not None:
+        masses["transmission.motor_mass_kg"] = scene.transmission.motor_mass_kg
+    key = min(masses, key=masses.__getitem__)
+    if scene.virtual_mass.most_kg >= masses[key]:
+        raise FieldError(FIELD, f"must be less than {key}, {masses[key]:g}, not {scene.virtual_mass.most_kg!r}")
 
 
 def _check_words(scene: Scene) -> None:
@@ -124,6 +140,8 @@ def _range_of(word: Word, scene: Scene) -> str:
     half = word.to_si(1) / 2
     least = f"{half:g}" if word.from_si(float(f"{half:g}")) else repr(half)
     above_0 = f"{least} (half of its word's LSB) to "
+    if word.low < 0:
+        return f"0, or {above_0}{word.si_max:g} of either sign"
     if word.name == "passivity_damping":
         return f"0, or {above_0}{word.si_max:g}"
     if word.name not in WALL_MAX:

@@ -48,6 +48,7 @@ def or_none(quantity: Any) -> Any:
 
 
 Mass = number(1e-6, 1e3)  # the needle of an instrument, to a vehicle
+SignedMass = number(-1e3, 1e3)
 Length = number(1e-12, 1e3)  # a count of an interferometer, to a hall
 Place = number(-1e3, 1e3)
 Part = number(0.0, 1.0)

@@ -11,6 +11,7 @@ from pydantic import Field, create_model
 
 from ...model.axis.design import Timing
 from ...model.axis.designed import DesignedAxis
+from ...model.axis.virtual_mass import FIELD
 from ...model.drive import pdm
 from ...model.encoder.quadrature_speed import GLITCH_CLOCKS_MAX, SPEED_MARGIN, glitch_clocks_for
 from ...model.estimators import registry
@@ -36,6 +37,7 @@ from .quantities import (
     Part,
     Place,
     Rate,
+    SignedMass,
     SlewRate,
     Speed,
     Step,
@@ -105,6 +107,16 @@ class PassivitySection(Section):
     taken, the controller damps by at most this much: see `hardwall.model.axis.passivity`."""
 
     damping_n_s_per_m: or_none(Damping)
+
+
+class VirtualMassSection(Section):
+    """A mass that the controller adds to the handle in the wall, and one in free space; below 0 it makes the handle
+    lighter. Both are at most `most_kg`, which is less than the handle's mass: see `hardwall.model.axis.virtual_mass`.
+    """
+
+    most_kg: Mass
+    in_wall_kg: SignedMass = 0.0
+    in_free_space_kg: SignedMass = 0.0
 
 
 class AmplifierSection(Section):
@@ -187,6 +199,7 @@ class Scene(Section):
     wall: WallSection
     coupling: CouplingSection | None = None
     passivity: PassivitySection | None = None
+    virtual_mass: VirtualMassSection | None = None
     amplifier: AmplifierSection | None = None
     motor: MotorSection | None = None
     transmission: TransmissionSection | None = None
@@ -205,7 +218,8 @@ class Scene(Section):
         gains = self.gains
         if gains is not None:
             gains = registry.design_of(self.controller.estimator).gains_class(**gains.model_dump())
-        parts = {name: getattr(self, name) is not None for name in ("passivity", "coupling")}
+        parts: dict[str, Any] = {name: getattr(self, name) is not None for name in ("passivity", "coupling")}
+        parts[FIELD] = None if self.virtual_mass is None else self.virtual_mass.most_kg
         derived = {"glitch_clocks": self.glitch_clocks, **parts}
         return fields | derived | {"count_m": self.encoder.count_m, "gains": gains}
 
@@ -277,6 +291,8 @@ class Scene(Section):
         si |= self.spec.design.estimator.choose(self.estimator_output)
         if self.passivity is not None:
             si["passivity_damping"] = self.passivity.damping_n_s_per_m
+        if self.virtual_mass is not None:
+            si |= {"wall_mass": self.virtual_mass.in_wall_kg, "free_mass": self.virtual_mass.in_free_space_kg}
         if self.controller.slew_limit_n_per_s is not None:
             si["output_slew_limit"] = self.controller.slew_limit_n_per_s
         return si

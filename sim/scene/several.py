@@ -16,6 +16,7 @@ ABSENT = {
     "drive": "the pipeline of several axes has no drive stages",
     "coupling": "the pipeline of several axes has no moving surfaces",
     "passivity": "the pipeline of several axes has no passivity controller",
+    "virtual_mass": "the pipeline of several axes has no acceleration",
     "zwidth": "no map is made of several axes",
 }
 """The sections that a scene of several axes may not have, and why."""

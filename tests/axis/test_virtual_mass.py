@@ -171,7 +171,7 @@ def test_a_word_beyond_the_bound_acts_as_the_bound():
 @pytest.mark.parametrize(
     ("most_kg", "estimator", "error", "message"),
     [
-        (0.1, "fdm", ValueError, r"virtual_mass_max_kg must be None with the estimator fdm, .* these have: kalman"),
+        (0.1, "fdm", ValueError, r"virtual_mass_max_kg needs an estimator with an acceleration \(kalman, .*, not fdm"),
         (0.0, "kalman", ValueError, r"virtual_mass_max_kg must be 1e-30 to 1e\+30, not 0\.0"),
         (math.nan, "kalman", ValueError, r"virtual_mass_max_kg must be 1e-30 to 1e\+30, not nan"),
         (1e-28, "kalman", ValueError, r"virtual_mass_max_kg must be at least 4\.\d+e-22 beside the force's resolution"),

@@ -26,6 +26,7 @@ OF_ONE_AXIS_ALONE = (
     "fit",
     "gains",
     "lipschitz",
+    "mass",
     "rates",
     "response",
     "trade",

@@ -32,6 +32,7 @@ RESULTS = {
     "rates": results.rate_gains,
     "rendered": results.rendered_walls,
     "response": results.responses,
+    "mass": results.masses,
     "replay": lambda: replay(swing(), coarsen=COARSEN),
     "trade": results.traded,
     "zwidth": results.maps,

@@ -16,6 +16,8 @@ from stimuli.scenes import OF_ONE_AXIS
 
 SEED = read("seed-2011")
 SEVEN_KHZ = {"controller.clock_hz": 14_000_000, "controller.sample_hz": 7000, "controller.actuation_hz": 7000}
+MASS = {"controller.estimator": "kalman", "virtual_mass.most_kg": 0.2}
+CABLE = {"transmission.stiffness_n_per_m": 2e5, "transmission.motor_mass_kg": 0.05}
 PULSES = {"output.dac_bits": None, "output.pwm_carrier_hz": 60_000, "output.pwm_steps": 200}
 
 
@@ -99,6 +101,25 @@ def test_a_file_that_is_no_regular_one_or_too_large_is_refused(tmp_path, monkeyp
             {"controller.slew_limit_n_per_s": 1e-9},
             "controller.slew_limit_n_per_s must be 0.5 (half of its word's LSB) to",
         ),
+        (
+            MASS | {"virtual_mass.in_wall_kg": 0.3},
+            "virtual_mass.in_wall_kg must be 0, or 5e-06 (half of its word's",
+        ),
+        (MASS | {"virtual_mass.in_free_space_kg": -0.3}, "virtual_mass.in_free_space_kg must be 0, or 5e-06 (half of"),
+        (
+            MASS | {"virtual_mass.in_wall_kg": -1e-9},
+            "virtual_mass.in_wall_kg must be 0, or 5e-06 (half of its word",
+        ),
+        (
+            MASS | {"virtual_mass.most_kg": 0.35},
+            "virtual_mass.most_kg must be less than handle.mass_kg, 0.35, not 0.35",
+        ),
+        (
+            MASS | {"controller.estimator": "levant"},
+            "virtual_mass.most_kg needs an estimator with an acceleration (kal",
+        ),
+        (MASS | CABLE, "virtual_mass.most_kg must be less than transmission.motor_mass_kg, 0.05, not 0.2"),
+        ({"virtual_mass.in_wall_kg": 0.1}, "virtual_mass.most_kg is missing"),
         ({"passivity.damping_n_s_per_m": 1e7}, "passivity.damping_n_s_per_m must be 0, or 0.003125 (half of its"),
         ({"wall.stiffness_n_per_m": 1.0}, "wall.stiffness_n_per_m must be 0, or 1.95313 (half of its word's LSB) to"),
         ({"wall.stiffness_n_per_m": 10**400}, "wall.stiffness_n_per_m must be 0, or 1.95313 (half of its word's LSB)"),

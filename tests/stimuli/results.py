@@ -19,6 +19,7 @@ from hardwall.sim.studies import (
     drop,
     gains,
     lipschitz,
+    mass,
     rates,
     response,
     shortcuts,
@@ -38,7 +39,7 @@ from hardwall.sim.walls.hit import Hit
 from hardwall.sim.walls.hit_axes import AxesHit
 from hardwall.sim.walls.hit_beside import Beside
 from hardwall.sim.walls.mapping import Effort
-from hardwall.sim.walls.methods import methods
+from hardwall.sim.walls.methods import Curve, methods
 from hardwall.sim.walls.zwidth import Map
 
 NOTHING = Effort("fixed", 0, 0.0)
@@ -163,6 +164,17 @@ def responses() -> response.Responses:
         for hz in (70.0, 200.0)
     ]
     return response.Responses(rows, "seed-2011")
+
+
+def masses() -> mass.Masses:
+    """Return the stable masses of two estimators at two rates, with one that none is, and one of no theory."""
+    curves, shares = [Curve(name, name, "u") for name in ("kalman", "levant-2")], [-0.5, 0.0, 0.5]
+    settings, starts = mass.settings_of(curves, [100_000]), 4
+    stable = [[row % 3, starts if row % 5 else row % 4, starts] for row in range(len(settings))]
+    stable[1] = [0, 3, 0]
+    theory = {(rate_hz, wall): (-0.3, 0.9) for _, rate_hz, wall in settings}
+    theory[None, mass.WALLS[-1]] = None
+    return mass.Masses("seed-2011", 0.35, starts, shares, settings, stable, theory)
 
 
 def costs_of_boards() -> costs.Costs:

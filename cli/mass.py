@@ -1,0 +1,49 @@
+"""The command `mass`."""
+
+from functools import partial
+from typing import Annotated
+
+import typer
+
+from ..sim.jobs.store import Store
+from ..sim.scene.case import Case
+from ..sim.studies import mass
+from ..sim.walls.mapping import verdict
+from .options import BackendOption, StartsOption, methods_option, numbers_of
+from .rates import RATES
+from .scenes import SceneArgument, curves_of, rates_of, refuse, refuse_for_maps
+from .study import StudyOptions, study
+
+
+@study("workers", "resume", "set_", "plot")
+def command(
+    options: StudyOptions,
+    scene: SceneArgument = "seed-2011",
+    wanted: Annotated[str | None, methods_option(",".join(mass.METHODS))] = None,
+    rates: Annotated[
+        str, typer.Option(metavar="HZ,...", help="sample rates beside the scene's own, 1e3 to 1e7 Hz; none: only those")
+    ] = "1e5",
+    masses: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SHARE,...",
+            help="virtual masses as shares of the handle's mass, -0.99 to 0.99",
+            show_default=",".join(f"{share:g}" for share in mass.SHARES),
+        ),
+    ] = None,
+    starts: StartsOption = 5,
+    backend: BackendOption = "fixed",
+) -> None:
+    changes, most = options.changes(), mass.MOST
+    refuse_for_maps(changes, "see --estimators")
+    refuse(changes, RATES, "see --rates")
+    refuse(changes, ("virtual_mass",), "see --masses")
+    case = Case.of(scene, changes)
+    rates_hz = [] if rates == "none" else sorted(rates_of(rates, "--rates"))
+    shares = list(mass.SHARES)
+    if masses is not None:
+        shares = sorted(numbers_of(masses, "--masses", -most, most, "of the handle's mass"))
+    settings = mass.settings_of(curves_of(wanted or ",".join(mass.METHODS)), rates_hz)
+    run = partial(options.results, f"{case.scene.name}, virtual masses", verdict, store=Store("zwidth", options.resume))
+    results = run(mass.jobs(case, settings, shares, starts, backend))
+    options.finish(mass.study(case, settings, shares, starts, results))
