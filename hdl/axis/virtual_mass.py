@@ -75,10 +75,11 @@ class VirtualMass(Block):
 
     def elaborate(self, platform):
         m = Module()
+        design = self.design
         in_wall, in_free_space = self._inertia(m, "wall", self.wall_mass), self._inertia(m, "free", self.free_mass)
         touches = self.force.any()
-        total = self.force - Mux(touches, in_wall, in_free_space)
-        forbidden = Signal()
+        total, forbidden = Signal(signed(design.inertia.width + 1)), Signal()
+        m.d.comb += total.eq(self.force - Mux(touches, in_wall, in_free_space))
         turned = forbidden & touches & (total[-1] ^ self.force[-1])
         m.d.sync += self.valid.eq(self.forced)
         with m.If(self.strobe):

@@ -42,6 +42,7 @@ BLOCKS = (
     Block("encoder/scale_map", RECORDED),
     Block("axis/wall", ("component.law",)),
     Block("axis/passivity", ("component.controller",)),
+    Block("axis/virtual_mass", ("component.mass",)),
     Block("axis/output", ("component.stage",)),
     Block("axis/monitors", RECORDED),
     Block("axis/supervisor", RECORDED),

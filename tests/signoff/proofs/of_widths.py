@@ -15,6 +15,7 @@ from hardwall.hdl.arithmetic.signed_divide import SignedDivide
 from hardwall.hdl.arithmetic.sqrt import Sqrt
 from hardwall.hdl.axis.output import Output
 from hardwall.hdl.axis.passivity import Passivity
+from hardwall.hdl.axis.virtual_mass import VirtualMass
 from hardwall.hdl.axis.wall import Wall
 from hardwall.hdl.encoder.quadrature import Quadrature
 from hardwall.hdl.encoder.scale_map import ScaleMap
@@ -40,7 +41,7 @@ from hardwall.model.encoder.scale_map import Design as Bins
 from hardwall.model.estimators.bursts import limits
 from stimuli.specs import spec
 
-from . import of_passivity, ranges
+from . import of_passivity, of_virtual_mass, ranges
 from .bench import Bench
 from .bugs import Bug
 from .property import Property
@@ -149,6 +150,11 @@ CASES = {
         MOVED,
         Bug(Passivity._observe, "init=MIDDLE), Signal(shape(design.displacement))", "init=MIDDLE), Signal(len(moved))"),
         of_passivity.keeps,
+    ),
+    "virtual_mass": Case(
+        of_virtual_mass.virtual_mass,
+        (),
+        Bug(VirtualMass.elaborate, "signed(design.inertia.width + 1)", "signed(design.inertia.width - 1)"),
     ),
     "output": Case(
         lambda axis: Output(spec(axis).design.output),

@@ -17,6 +17,7 @@ from . import (
     of_supervised,
     of_supervised_axes,
     of_supervisor,
+    of_virtual_mass,
     of_wall,
     of_widths,
 )
@@ -26,6 +27,7 @@ PROPERTIES = [
     *of_arithmetic.PROPERTIES,
     *of_wall.PROPERTIES,
     *of_passivity.PROPERTIES,
+    *of_virtual_mass.PROPERTIES,
     *of_output.PROPERTIES,
     *of_supervisor.PROPERTIES,
     *of_axis.PROPERTIES,
