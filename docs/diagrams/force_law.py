@@ -44,9 +44,7 @@ def _path(sheet: Sheet) -> Box:
     decoder = sheet.box(Box(46, top, 74, high), "decoder", tone=GREY)
     estimator = sheet.box(Box(166, top, 84, high), "estimator", tone=BLUE)
     law = sheet.box(Box(326, top, 92, high), bold("FORCE"), bold("LAW"), tone=ORANGE, lw=2.8)
-    passivity = sheet.box(
-        Box(466, top, 86, high), "passivity", "controller", small("optional"), tone=PURPLE, dashed=True
-    )
+    passivity = sheet.box(Box(466, top, 86, high), "mass,", "passivity", small("optional"), tone=PURPLE, dashed=True)
     output = sheet.box(Box(574, top, 68, high), "output", "stage", tone=GREEN)
     sheet.chain(decoder, estimator, law, passivity, output)
     sheet.wire((10, decoder.y), decoder.west)

@@ -6,7 +6,7 @@ import reports
 
 from support.reports import check
 
-from . import accuracy, hardware, rendered, response, rivals, trade, walls
+from . import accuracy, hardware, mass, rendered, response, rivals, trade, walls
 
 
 class UnknownError(Exception):
@@ -25,6 +25,7 @@ VIEWS: dict[str, Callable[..., list[str]]] = {
     "without-jerk": walls.without_jerk,
     "samples": walls.samples,
     "responses": response.responses,
+    "masses": mass.masses,
     "regions": walls.maps,
     "facts": walls.facts,
     "assumptions": walls.assumptions,

@@ -234,7 +234,7 @@ class Axis(Component):
             m.d.comb += [
                 mass.strobe.eq(estimator.valid),
                 mass.acceleration.eq(estimator.acceleration),
-                mass.wall_forbid_pull.eq(active["wall_forbid_pull"]),
+                mass.wall_forbid_pull.eq(active.get("wall_forbid_pull", 0)),
                 mass.forced.eq(wall.valid),
                 mass.force.eq(wall.force),
             ]

@@ -4,7 +4,8 @@
     given = force - M acceleration                              on the handle
 
 A positive M makes the handle heavier. A negative one makes it lighter: it compensates a part of the handle's inertia.
-In the wall the sum does not change the sign of the wall's force if the wall may not pull (`wall_forbid_pull`).
+In the wall the sum does not change the sign of the wall's force if the wall may not pull (`wall_forbid_pull`; a force
+law without this word may).
 
 Bounds. Both words are within `virtual_mass_max_kg`, which must be less than the mass of the handle. A word beyond it
 acts as the bound. Let the handle have the mass m, and the acceleration be known exactly, but late. In m a = -M a', with
@@ -127,7 +128,7 @@ class Design:
         return Params(
             in_wall=saturate(words["wall_mass"], -self.most, self.most),
             in_free_space=saturate(words["free_mass"], -self.most, self.most),
-            forbid_pull=words["wall_forbid_pull"],
+            forbid_pull=words.get("wall_forbid_pull", 0),
             acceleration_shift=self.acceleration.f - self.coarse.f,
             mass_shift=self.shift,
             inertia_max=self.inertia.max,
@@ -137,7 +138,9 @@ class Design:
     def float_params(self, wall_kg: float, free_kg: float, words: dict[str, int]) -> FloatParams:
         """Return the float64 kernel's parameters, with the masses unrounded."""
         unit_kg = self.words[0].si_per_unit
-        return FloatParams(wall_kg / unit_kg, free_kg / unit_kg, words["wall_forbid_pull"], float(self.force.max))
+        return FloatParams(
+            wall_kg / unit_kg, free_kg / unit_kg, words.get("wall_forbid_pull", 0), float(self.force.max)
+        )
 
 
 @by_type

@@ -8,6 +8,7 @@ from fractions import Fraction
 import cocotb
 import numpy as np
 import pytest
+from cocotb.triggers import RisingEdge
 
 from hardwall.hdl.axis.virtual_mass import VirtualMass
 from hardwall.model.axes.axis import AxesSpec
@@ -61,7 +62,9 @@ def stimulus(d: virtual_mass.Design, samples: int):
     )
     for row in zip(*(column.tolist() for column in columns), strict=True):
         yield row
-        # The same, where the sum is a few LSB from zero.
+        # The same in free space, with either mass; and where the sum is a few LSB from zero.
+        yield *row[:4], 0
+        yield row[0], row[2], row[1], row[3], 0
         near = math.floor(Fraction(row[1] * (row[0] >> a.f - d.coarse.f)) / Fraction(2) ** d.shift)
         if 0 < abs(near) <= f.max - 4:
             yield *row[:4], near + int(random.integers(-3, 4))
@@ -87,6 +90,27 @@ async def follows_model(dut):
         expected = model(d, inputs.rows)
         assert {-d.force.max, 0, d.force.max} <= set(expected)
         check(inputs, outputs, {"given": np.array(expected)}, component.latency)
+
+
+@cocotb.test()
+async def the_force_is_0_after_reset_and_constant_from_one_valid_to_the_next(dut):
+    component = make(**parameters())
+    d, bench, before = component.design, Bench(dut, component), 0
+    await bench.reset()
+    given = bench.reader("given")
+    for row in (
+        (d.acceleration.max, d.most, 0, 0, 1),
+        (d.acceleration.min, 0, d.most, 1, 0),
+        (0, 0, 0, 0, d.force.max),
+    ):
+        bench.drive(**dict(zip(NAMES, row, strict=True)), strobe=1)
+        for clock in range(component.latency + 3):
+            await RisingEdge(dut.clk)
+            bench.drive(strobe=0)
+            assert given() == before, f"the force changed {clock} clocks after the strobe"
+            if clock == component.latency - 1:
+                (before,) = model(d, [row])
+        assert before
 
 
 @pytest.mark.parametrize(("name", "estimator", "most_kg", "behind"), some_of(SIZES, 1, 2))
