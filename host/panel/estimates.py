@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...model.axis import axis as model
+from ...model.estimators.acceleration import room_of
 from ...model.spec import AxisSpec
 
 PLAIN = "fdm"
@@ -35,11 +36,12 @@ class _Lane:
 
     def run(self, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the velocities (m/s) and the wall's forces (N) of successive counts."""
-        words = [np.zeros(len(counts), np.int64) for _ in range(4)]
+        made = room_of(self.spec.design.estimator, counts.shape, np.int64)
+        words = [np.zeros(len(counts), np.int64) for _ in range(3)]
         # A fault of the encoder changes neither velocity nor force; the board's drive is not looked at here.
         faults = np.zeros(len(counts), np.int64)
-        self._state = model.run(self._params, self._state, counts, faults, *words)
-        record = model.Record(self.spec.design, *words)
+        self._state = model.run(self._params, self._state, counts, faults, made, *words)
+        record = model.Record(self.spec.design, made.velocity, *words)
         return record.velocity_m_per_s, record.force_n
 
 
