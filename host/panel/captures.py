@@ -47,7 +47,7 @@ class CaptureCard:
                 self._level = ui.number("Level", value=0, suffix="mm", format="%.7g")
                 rises_or_falls = lambda name: name in ("rise", "fall")  # noqa: E731
                 self._level.bind_visibility_from(self._trigger, "value", backward=rises_or_falls)
-                self._motion = ui.select(list(MOTIONS), value=MOTIONS[0], label="Record")
+                self._motion = ui.select(list(MOTIONS), value=MOTIONS[0], label="Record").classes("motion")
                 self._motion.set_visibility(driver.view.device is not None and driver.view.device.accelerates)
                 for field in (self._trigger, self._span, self._before, self._level, self._motion):
                     field.props("dense outlined hide-bottom-space")
