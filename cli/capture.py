@@ -37,6 +37,10 @@ class Captures(Summary):
 
     def report(self) -> dict[str, Any]:
         found = self.captured
+        motions = {
+            "speed_most_m_per_s": found.velocity_m_per_s,
+            "acceleration_most_m_per_s2": found.acceleration_m_per_s2,
+        }
         return {
             "identity": found.identity,
             "records": len(found.time_s),
@@ -45,7 +49,7 @@ class Captures(Summary):
             "to_s": float(found.time_s[-1]),
             "position_least_m": float(found.position_m.min()),
             "position_most_m": float(found.position_m.max()),
-            "speed_most_m_per_s": float(abs(found.velocity_m_per_s).max()),
+            **{name: float(abs(values).max()) for name, values in motions.items() if values is not None},
             "force_most_n": float(abs(found.force_n).max()),
             "flags": [name for name in found.flag_names if found.flag(name).any()],
         }
@@ -74,6 +78,9 @@ def command(
     level: Annotated[
         float, typer.Option(metavar="M", help="position at which the triggers rise and fall act, m")
     ] = 0.0,
+    acceleration: Annotated[
+        bool, typer.Option("--acceleration", help="record the acceleration in place of the velocity")
+    ] = False,
     arm: Annotated[bool, typer.Option("--arm", help="arm the axis first; disarm it at the end")] = False,
     last: Annotated[
         bool, typer.Option("--last", help="read the capture that the board already has, without starting one")
@@ -89,15 +96,17 @@ def command(
     within(seconds, "--seconds", 0.0, 1e6, "s")
     out = output_file(out, "--out", (".npz",))
     values, sources = values_of(words or []), _sources(trigger)
-    if last and (words or arm or (trigger, before, decimation, level) != (TRIGGER, None, 1, 0.0)):
-        raise BadInput("--last reads a finished capture: no word, --arm, --trigger, --before, --decimation or --level")
+    if last and (words or arm or acceleration or (trigger, before, decimation, level) != (TRIGGER, None, 1, 0.0)):
+        others = "--arm, --trigger, --before, --decimation, --level or --acceleration"
+        raise BadInput(f"--last reads a finished capture: no word, {others}")
     with axis_at(port, baud, identity, pace) as axis:
         if values:
             axis.set(**values)
         if arm:
             axis.arm()
         if not last:
-            axis.capture.start([source for source in sources if source != HAND], before, decimation, level)
+            events = [source for source in sources if source != HAND]
+            axis.capture.start(events, before, decimation, level, acceleration)
             _wait(axis, HAND in sources, seconds)
         captured = _read(axis, port, lives=not last)
     options.finish(Captures(captured), {"records": (out, captured.save)} if out else {})

@@ -73,6 +73,7 @@ def _summary(port: str, axis: Axis) -> dict[str, Any]:
         "referenced": status.referenced,
         "position_m": status.position_m,
         "velocity_m_per_s": status.velocity_m_per_s,
+        "acceleration_m_per_s2": status.acceleration_m_per_s2,
         "force_n": status.force_n,
         "flags": list(status.flags),
         "a_channel_idle": status.a_channel_idle,

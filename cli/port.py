@@ -61,7 +61,9 @@ def axis_at(port: str, baud: int, identity: str | None, pace: float | None) -> I
 def line_of(status: Status) -> str:
     """Return a status as a line for people."""
     said = f"; {status.trip}" if status.trip else f"; {', '.join(status.flags)}" if status.flags else ""
+    acceleration = status.acceleration_m_per_s2
+    accelerates = "" if acceleration is None else f"{acceleration:9.3f} m/s^2 "
     return (
         f"{status.state.name:8} {1e3 * status.position_m:10.4f} mm {1e3 * status.velocity_m_per_s:9.3f} mm/s "
-        f"{status.force_n:9.4f} N{said}"
+        f"{accelerates}{status.force_n:9.4f} N{said}"
     )

@@ -12,7 +12,7 @@ from .capture import Capture
 from .device import Device, read_identity
 from .durations import check_seconds
 from .errors import ChangedError, HostError, LateError, NotReadyError, RefusedError, TrippedError
-from .groups import Named, Supervisor, Wall
+from .groups import FreeSpace, Named, Supervisor, Wall
 from .heartbeat import LEASE_S, Beat, Heartbeat
 from .homing import Homed, homing
 from .port import Port
@@ -34,9 +34,9 @@ LATCHED = Trip(0, (), (), {})
 class Axis(Named):
     """An axis on a board, from `hardwall.host.connect`. A context manager that disarms and closes.
 
-    These calls renew the application's lease: `set`, every attribute of `wall` and `supervisor`, `arm`, `renew`,
-    `sleep` and `watch`. The lease lasts half a second of the board. While it lasts, a thread sends the heartbeat. If an
-    application hangs, or only reads, the axis trips with the cause link_timeout.
+    These calls renew the application's lease: `set`, every attribute of `wall`, `free` and `supervisor`, `arm`,
+    `renew`, `sleep` and `watch`. The lease lasts half a second of the board. While it lasts, a thread sends the
+    heartbeat. If an application hangs, or only reads, the axis trips with the cause link_timeout.
 
     Several threads may use it. If one arms while another disarms or closes, the axis ends disarmed.
 
@@ -49,6 +49,7 @@ class Axis(Named):
     Attributes:
         device: the board's identity and registers.
         wall: the wall.
+        free: free space, where the wall has no force.
         supervisor: the limits.
         capture: the capture memory.
 
@@ -58,6 +59,7 @@ class Axis(Named):
 
     device: Device
     wall: Wall
+    free: FreeSpace
     supervisor: Supervisor
     capture: Capture
 
@@ -66,7 +68,7 @@ class Axis(Named):
         # The time, of time.monotonic, after which no write goes out, except a disarm and beats.
         self._until_s = math.inf
         self._words = Words(port, device, None if shared is None else shared.words, self._check_time)
-        self.wall, self.supervisor = Wall(self), Supervisor(self)
+        self.wall, self.free, self.supervisor = Wall(self), FreeSpace(self), Supervisor(self)
         self.capture = Capture(self, number)
         self._status = device.of_kind(Kind.STATUS)
         # Whether this program may have ARMED it; and whether it may be ARMED against this program's wish: by a host

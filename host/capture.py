@@ -20,10 +20,10 @@ from .status import flag_names
 
 PART_RECORDS = 15
 """Records that are read by one request."""
-VALUES = "count", "velocity", "driven"
-"""The status whose formats the values of a record have, in their order."""
 TAKEN = "capture_axis"
 """The word that selects the captured axis, on a board of several axes."""
+ACCELERATED = "capture_acceleration"
+"""The word that selects the acceleration, on a board that has one."""
 LOOK_S = 0.02
 """The time between two looks at the state of a capture."""
 
@@ -32,10 +32,13 @@ LOOK_S = 0.02
 class Captured:
     """A capture. Every array has one element per record; `place` of the records are before the trigger.
 
+    Records have either the velocity or the acceleration. The array of the other one is None.
+
     Attributes:
         time_s: time from the first record at the trigger or behind it, s.
         position_m: the position that the sample took, m.
-        velocity_m_per_s: the velocity estimated from it, m/s.
+        velocity_m_per_s: the velocity estimated from it, m/s; or None.
+        acceleration_m_per_s2: the acceleration estimated from it, m/s^2; or None.
         force_n: the force that was let out for it, N.
         flags: bits as in `flag_names`.
         flag_names: names of the flags, bit 0 first.
@@ -45,7 +48,8 @@ class Captured:
 
     time_s: np.ndarray
     position_m: np.ndarray
-    velocity_m_per_s: np.ndarray
+    velocity_m_per_s: np.ndarray | None
+    acceleration_m_per_s2: np.ndarray | None
     force_n: np.ndarray
     flags: np.ndarray
     flag_names: tuple[str, ...]
@@ -64,9 +68,9 @@ class Captured:
 
     @property
     def npz(self) -> bytes:
-        """The content of an .npz file with the arrays, their names, and the identity."""
+        """The content of an .npz file with all that is not None, by its name."""
         file = io.BytesIO()
-        np.savez_compressed(file, **vars(self))
+        np.savez_compressed(file, **{name: value for name, value in vars(self).items() if value is not None})
         return file.getvalue()
 
     def save(self, path: Path) -> None:
@@ -131,6 +135,7 @@ class Capture:
         before: int | None = None,
         decimation: int = 1,
         level_m: float = 0.0,
+        acceleration: bool = False,
     ) -> None:
         """Begin a capture of this axis, whatever was before, and of whichever axis.
 
@@ -140,13 +145,16 @@ class Capture:
             before: records that are wanted before the trigger; a quarter of all if it is not given.
             decimation: samples from a record to the next.
             level_m: that level, m.
+            acceleration: whether records have the acceleration in place of the velocity.
 
         Raises:
             FieldError: if a source is not known, or a number is out of its range.
-            NotReadyError: if the board has no capture memory.
+            NotReadyError: if the board has no capture memory, or is asked for an acceleration that it does not have.
             HostError: if the board is not reached.
         """
         self._check()
+        if acceleration and not self._board.device.accelerates:
+            raise NotReadyError("the board has no acceleration: its estimator estimates only the velocity")
         sources = [sources] if isinstance(sources, str) else sources
         for source in sources:
             if source not in SOURCES:
@@ -159,6 +167,7 @@ class Capture:
             capture_before=wanted,
             capture_decimation=decimation,
             **({TAKEN: self._axis} if self._several else {}),
+            **({ACCELERATED: acceleration} if self._board.device.accelerates else {}),
         )
         self._board.pulse("capture_start")
 
@@ -243,13 +252,16 @@ class Capture:
             )
         halves = cells.astype(np.int64)
         values = (halves[:, 0:6:2] << 16 | halves[:, 1:6:2]).astype(np.uint32).view(np.int32)
-        count, velocity, driven = (values[:, k] * device.registers[name].lsb for k, name in enumerate(VALUES))
+        # The records have the formats of the status with these names.
+        motion = "acceleration" if device.accelerates and self._board.get(ACCELERATED) else "velocity"
+        si = {name: values[:, k] * device.registers[name].lsb for k, name in enumerate(("count", motion, "driven"))}
         known = device.registers["flags"].format.width
         return Captured(
             time_s=(np.arange(len(cells)) - place) * (clocks / device.clock_hz),
-            position_m=count,
-            velocity_m_per_s=velocity,
-            force_n=driven,
+            position_m=si["count"],
+            velocity_m_per_s=si.get("velocity"),
+            acceleration_m_per_s2=si.get("acceleration"),
+            force_n=si["driven"],
             flags=halves[:, 6],
             flag_names=(*STATE_FLAGS, *flag_names(known)),
             place=place,

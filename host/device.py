@@ -57,6 +57,11 @@ class Device:
         return tuple(each for each in self.registers.values() if each.kind is kind)
 
     @property
+    def accelerates(self) -> bool:
+        """Whether its estimator has an acceleration."""
+        return "acceleration" in self.registers
+
+    @property
     def constants(self) -> tuple[Register, ...]:
         """The registers of the constants, in the order of their addresses; a device of one axis has no `axes`."""
         return tuple(

@@ -1,4 +1,4 @@
-"""The words of a board as attributes, in SI units: of its wall, and of what limits its drive."""
+"""The words of a board as attributes, in SI units: of its wall, of free space, and of what limits its drive."""
 
 import difflib
 from typing import Protocol
@@ -84,6 +84,15 @@ class Wall(Group):
     forbid_pull = Value("1 if the wall may not pull the handle in, else 0.")
     velocity = Value("The velocity of its surface, m/s; of a board with a coupling alone.")
     two_sided = Value("1 if the wall holds on both sides, if it may pull, else 0; of a board with a coupling alone.")
+    mass = Value("The virtual mass where the wall has a force, kg; of a board with a virtual mass alone.")
+
+
+class FreeSpace(Group):
+    """What the handle feels where the wall has no force. Every attribute is written and committed when it is set."""
+
+    __slots__ = ()
+    PREFIX = "free_"
+    mass = Value("The virtual mass there, kg; below 0 to lighten the handle; of a board with a virtual mass alone.")
 
 
 class Supervisor(Group):

@@ -17,8 +17,8 @@ RATE_HZ, RATE_LEAST_HZ, RATE_MOST_HZ = 20.0, 1e-3, 1e3
 GAPS = 5
 """The gaps that are remembered, the longest ones."""
 COLUMNS = (
-    *("time_s", "unix_s", "stamp_s", "state", "position_m", "velocity_m_per_s", "wall_force_n", "force_n"),
-    *("live", "ready", "referenced", "a_channel_idle", "flags", "causes", "missed"),
+    *("time_s", "unix_s", "stamp_s", "state", "position_m", "velocity_m_per_s", "acceleration_m_per_s2"),
+    *("wall_force_n", "force_n", "live", "ready", "referenced", "a_channel_idle", "flags", "causes", "missed"),
 )
 """The columns of a sample's row."""
 
@@ -48,7 +48,8 @@ class Sample(NamedTuple):
 
     @property
     def row(self) -> dict[str, Any]:
-        """The values by `COLUMNS`, as JSON takes them. Without a status its values are None."""
+        """The values by `COLUMNS`, as JSON takes them. Without a status its values are None. A board without an
+        acceleration has None in its column."""
         row = dict.fromkeys(COLUMNS) | {"time_s": round(self.time_s, 6), "unix_s": round(self.unix_s, 6)}
         if status := self.status:
             row |= {name: getattr(status, name) for name in COLUMNS if hasattr(status, name)}

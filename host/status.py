@@ -45,6 +45,7 @@ class Status:
     Attributes:
         state: the state of the supervisor.
         position_m, velocity_m_per_s: the handle's, estimated at the last sample.
+        acceleration_m_per_s2: the handle's, estimated at the last sample; None if the board's estimator has none.
         wall_force_n: the wall's force on the handle at the last sample.
         force_n: the force that is let out.
         stamp_s: the time of the clock, which wraps behind the largest value of the register `stamp`.
@@ -58,6 +59,7 @@ class Status:
     state: State
     position_m: float
     velocity_m_per_s: float
+    acceleration_m_per_s2: float | None
     wall_force_n: float
     force_n: float
     stamp_s: float
@@ -76,6 +78,7 @@ def status_of(words: dict[str, int], si: dict[str, float], flag_bits: int) -> St
         State(words["state"]),
         si["count"],
         si["velocity"],
+        si.get("acceleration"),
         si["wall_force"],
         si["driven"],
         si["stamp"],

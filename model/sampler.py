@@ -24,6 +24,7 @@ from .axis.design import strobe_of
 from .checks import check_number, shown
 from .encoder.level import level
 from .encoder.quadrature import Inputs, advance
+from .estimators.acceleration import Accelerated, acceleration_of
 from .runtime.compiled import compiled, inlined
 from .spec import AxisSpec
 from .stamped import State, controller, sample_quietly
@@ -92,6 +93,12 @@ def _take(cell, position):
     cell.velocity, cell.flags = cell.state.velocity, cell.state.flags
     cell.count = cell.state.decoder.count
     return float(cell.state.drive)
+
+
+@numba.njit(error_model="numpy", nogil=True)
+def _acceleration(cell):
+    """Return the acceleration of the last sample, of a cell whose estimator has one."""
+    return float(acceleration_of(cell.controller.axis.estimator, cell.state.axis.estimator))
 
 
 @cache
@@ -218,6 +225,16 @@ class Sampler:
         """The velocity of the last sample, m/s; 0 before the first."""
         lsb = 1.0 if self._floating else self._axis.design.estimator.velocity.lsb
         return 0.0 if self._kept is None else self._kept.velocity * lsb * self.spec.velocity_unit_m_per_s
+
+    @property
+    def acceleration_m_per_s2(self) -> float | None:
+        """The acceleration of the last sample, m/s^2; 0 before the first, and None for an estimator without one."""
+        estimator = self._axis.design.estimator
+        if not isinstance(estimator, Accelerated):
+            return None
+        lsb = 1.0 if self._floating else estimator.acceleration.lsb
+        unit_m_per_s2 = self.spec.velocity_unit_m_per_s * self.spec.sample_hz
+        return 0.0 if self._kept is None else _acceleration(self._kept) * lsb * unit_m_per_s2
 
     @property
     def count(self) -> int:

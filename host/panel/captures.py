@@ -16,6 +16,8 @@ CALLED = {
     "now": "now",
 }
 """The names of the triggers on the page."""
+MOTIONS = "velocity", "acceleration"
+"""What a record can have beside position and force, on a board with an acceleration."""
 STATES = {
     "IDLE": "",
     "FILLING": "keeps what comes before the trigger",
@@ -45,7 +47,9 @@ class CaptureCard:
                 self._level = ui.number("Level", value=0, suffix="mm", format="%.7g")
                 rises_or_falls = lambda name: name in ("rise", "fall")  # noqa: E731
                 self._level.bind_visibility_from(self._trigger, "value", backward=rises_or_falls)
-                for field in (self._trigger, self._span, self._before, self._level):
+                self._motion = ui.select(list(MOTIONS), value=MOTIONS[0], label="Record").classes("motion")
+                self._motion.set_visibility(driver.view.device is not None and driver.view.device.accelerates)
+                for field in (self._trigger, self._span, self._before, self._level, self._motion):
                     field.props("dense outlined hide-bottom-space")
                 begin = ui.button("Capture").props("dense no-caps").mark("capture")
                 begin.on("click", self._begin, js_handler=TIMED)
@@ -74,7 +78,8 @@ class CaptureCard:
             return
         try:
             span_ms, before_percent, level_mm = (number_of(name, field.value) for name, field in fields.items())
-            wish = Wish(self._trigger.value, 1e-3 * span_ms, 1e-2 * before_percent, 1e-3 * level_mm)
+            accelerates = self._motion.value == MOTIONS[1]
+            wish = Wish(self._trigger.value, 1e-3 * span_ms, 1e-2 * before_percent, 1e-3 * level_mm, accelerates)
             asked_s = time_from(event.args)
         except (TypeError, ValueError) as error:
             ui.notify(f"{error}", type="warning")

@@ -9,9 +9,11 @@ from ..capture import Captured
 TRACES = (
     ("position", "mm", "position_m", 1e3, "#1d2733"),
     ("velocity", "mm/s", "velocity_m_per_s", 1e3, "#2f7d32"),
+    ("acceleration", "m/s\u00b2", "acceleration_m_per_s2", 1.0, "#2f7d32"),
     ("force", "N", "force_n", 1.0, "#b25500"),
 )
-"""A trace: its name, its unit, the array, the number of these units in the SI unit, and a colour."""
+"""A trace: its name, its unit, the array, the number of these units in the SI unit, and a colour. Records have either
+the velocity or the acceleration."""
 HEIGHT, GAP, TOP = 25, 6, 3
 """The height of a drawing, the gap between two and above the first, percent of the card."""
 MICROSECONDS_BELOW_S = 1e-3
@@ -27,20 +29,22 @@ def chart_of(captured: Captured) -> dict[str, Any]:
     """Return the options of the chart of a capture."""
     time_s = captured.time_s
     unit, scale = ("\u00b5s", 1e6) if time_s[-1] - time_s[0] < MICROSECONDS_BELOW_S else ("ms", 1e3)
-    places = list(range(len(TRACES)))
+    traces = [trace for trace in TRACES if getattr(captured, trace[2]) is not None]
+    places = list(range(len(traces)))
     lines = [
         _line(place, name, colour, _points(scale * time_s, factor * getattr(captured, array)))
-        for place, (name, _, array, factor, colour) in enumerate(TRACES)
+        for place, (name, _, array, factor, colour) in enumerate(traces)
     ]
     below = {"name": f"time after the trigger ({unit})", "nameLocation": "middle", "nameGap": 24}
+    last = _time_axis(places[-1]) | below | {"axisLabel": {"hideOverlap": True}}
     return {
         **empty(),
         "grid": [
             {"left": 78, "right": 18, "top": f"{TOP + place * (HEIGHT + GAP)}%", "height": f"{HEIGHT}%"}
             for place in places
         ],
-        "xAxis": [_time_axis(place) | (below if place == places[-1] else {}) for place in places],
-        "yAxis": [_value_axis(place, f"{name} ({unit_of})") for place, (name, unit_of, *_) in enumerate(TRACES)],
+        "xAxis": [*map(_time_axis, places[:-1]), last],
+        "yAxis": [_value_axis(place, f"{name} ({unit_of})") for place, (name, unit_of, *_) in enumerate(traces)],
         "tooltip": {"trigger": "axis"},
         "axisPointer": {"link": [{"xAxisIndex": "all"}]},
         "dataZoom": [{"type": "inside", "xAxisIndex": places, "filterMode": "filter"}],
@@ -49,8 +53,7 @@ def chart_of(captured: Captured) -> dict[str, Any]:
 
 
 def _time_axis(place: int) -> dict[str, Any]:
-    label = {"show": place == len(TRACES) - 1, "hideOverlap": True}
-    return {"type": "value", "gridIndex": place, "min": "dataMin", "max": "dataMax", "axisLabel": label}
+    return {"type": "value", "gridIndex": place, "min": "dataMin", "max": "dataMax", "axisLabel": {"show": False}}
 
 
 def _value_axis(place: int, name: str) -> dict[str, Any]:

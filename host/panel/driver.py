@@ -35,13 +35,17 @@ SAID_S = 8.0
 
 
 class Sample(NamedTuple):
-    """A look at the board: the time of this computer, and what the axis did, in SI units."""
+    """A look at the board: the time of this computer, and what the axis did, in SI units.
+
+    The acceleration is None on a board that has none.
+    """
 
     time_s: float
     position_m: float
     velocity_m_per_s: float
     wall_force_n: float
     force_n: float
+    acceleration_m_per_s2: float | None
 
 
 class Driver:
@@ -350,11 +354,11 @@ class Driver:
         """Read the board."""
         status = axis.status
         now_s = time.monotonic()
+        motion = status.position_m, status.velocity_m_per_s
+        forces = status.wall_force_n, status.force_n
         with self._lock:
             self._taken += 1
-            self._samples.append(
-                Sample(now_s, status.position_m, status.velocity_m_per_s, status.wall_force_n, status.force_n)
-            )
+            self._samples.append(Sample(now_s, *motion, *forces, status.acceleration_m_per_s2))
         if now_s - self._leased_s > LEASE_LOOK_S:
             self._leased_s = now_s
             self._look_at_lease(axis)

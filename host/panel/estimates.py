@@ -37,11 +37,11 @@ class _Lane:
     def run(self, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the velocities (m/s) and the wall's forces (N) of successive counts."""
         made = room_of(self.spec.design.estimator, counts.shape, np.int64)
-        force, drive, flags = (np.zeros(len(counts), np.int64) for _ in range(3))
+        words = [np.zeros(len(counts), np.int64) for _ in range(3)]
         # A fault of the encoder changes neither velocity nor force; the board's drive is not looked at here.
         faults = np.zeros(len(counts), np.int64)
-        self._state = model.run(self._params, self._state, counts, faults, made, force, drive, flags)
-        record = model.Record(self.spec.design, made.velocity, force, drive, flags)
+        self._state = model.run(self._params, self._state, counts, faults, made, *words)
+        record = model.Record(self.spec.design, made.velocity, *words)
         return record.velocity_m_per_s, record.force_n
 
 

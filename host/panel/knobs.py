@@ -13,7 +13,7 @@ HIDDEN = ("preload_count", "supervisor_causes", *OF_THE_HEARTBEAT)
 CAPTURE = "capture_"
 """Words that are no settings for a person at a page, and the prefix of the names of a capture's words."""
 UNITS = {
-    **{"m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "s": ("ms", 1e3)},
+    **{"m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "s": ("ms", 1e3), "kg": ("g", 1e3)},
     **{"m/s^2": ("m/s\u00b2", 1.0), "m^(1/2)/s": ("\u221am/s", 1.0)},
 }
 """The unit that is shown, and how many of it the SI unit has."""
@@ -31,6 +31,8 @@ LABELS = {
     "wall_forbid_pull": "Never pull",
     "wall_velocity": "Velocity of the surface",
     "wall_two_sided": "Hold on both sides",
+    "wall_mass": "Virtual mass in the wall",
+    "free_mass": "Virtual mass in free space",
     "supervisor_force_limit": "Force limit",
     "supervisor_ramp": "Rise of the limit",
     "supervisor_watchdog": "Watchdog",
@@ -170,7 +172,7 @@ def knobs_of(device: Device) -> tuple[Knob, ...]:
 def _group(name: str) -> Group:
     if name in WIRING:
         return Group.WIRING
-    if name.startswith("wall_"):
+    if name.startswith(("wall_", "free_")):
         return Group.WALL
     return Group.LIMITS if name.startswith("supervisor_") else Group.ESTIMATOR
 

@@ -43,7 +43,9 @@ def add_page(driver: Driver, bench: Bench | None, title: str, access: str) -> No
     def _() -> None:
         tab = ui.context.client.id
         ui.add_head_html('<link rel="stylesheet" href="static/panel.css">')
-        ui.add_head_html(f'<script>window.hardwallTab = "{tab}"</script>')
+        device = driver.view.device
+        accelerates = "true" if device and device.accelerates else "false"
+        ui.add_head_html(f'<script>window.hardwallTab = "{tab}"; window.hardwallAccelerates = {accelerates}</script>')
         ui.add_body_html('<script type="module" src="static/panel.js"></script>')
         ui.colors(primary="#1f5f8b")
         ui.html(HEAD, sanitize=False).classes("head")

@@ -29,6 +29,7 @@ class Wish:
         span_s: the time from the first record to the last, at least; the memory decides which are possible.
         before: the share of it before the trigger, 0 to 1.
         level_m: the position of the triggers `rise` and `fall`, m.
+        acceleration: whether records have the acceleration in place of the velocity.
 
     Raises:
         FieldError: if a value is out of its range.
@@ -38,6 +39,7 @@ class Wish:
     span_s: float = 0.0
     before: float = 0.25
     level_m: float = 0.0
+    acceleration: bool = False
 
     def __post_init__(self) -> None:
         if self.trigger not in TRIGGERS:
@@ -92,6 +94,7 @@ class Recorder:
             before=min(round(wish.before * records), records - 1),
             decimation=max(math.ceil(wish.span_s / least_s), 1),
             level_m=wish.level_m,
+            acceleration=wish.acceleration,
         )
         self._say(state="FILLING", read=0.0)
 

@@ -1,4 +1,4 @@
-"""The picture of a capture: position, velocity and force around its trigger, and the flags."""
+"""The picture of a capture: position, velocity or acceleration, and force around its trigger, and the flags."""
 
 from typing import Protocol
 
@@ -24,13 +24,17 @@ def draw(shows: Shows) -> Figure:
     result = shows.captured
     time_ms, shown = 1e3 * result.time_s, [name for name in result.flag_names if result.flag(name).any()]
     figure = new_figure(6.4, _title(result))
-    position, velocity, force, flags = panels = figure.subplots(
+    position, motion, force, flags = panels = figure.subplots(
         4, 1, sharex=True, height_ratios=(1.2, 1.2, 1.2, 0.2 + 0.16 * len(shown))
     )
     position.plot(time_ms, 1e3 * result.position_m, color="black", lw=1, drawstyle="steps-post")
     position.set_ylabel("position (mm)")
-    velocity.plot(time_ms, 1e3 * result.velocity_m_per_s, color=WALL, lw=0.9)
-    velocity.set_ylabel("velocity (mm/s)")
+    if result.velocity_m_per_s is not None:
+        motion.plot(time_ms, 1e3 * result.velocity_m_per_s, color=WALL, lw=0.9)
+        motion.set_ylabel("velocity (mm/s)")
+    if result.acceleration_m_per_s2 is not None:
+        motion.plot(time_ms, result.acceleration_m_per_s2, color=WALL, lw=0.9)
+        motion.set_ylabel("acceleration (m/s²)")
     force.plot(time_ms, result.force_n, color=FORCE, lw=0.9, drawstyle="steps-post")
     force.set_ylabel("force (N)")
     for row, name in enumerate(shown):

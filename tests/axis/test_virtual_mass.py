@@ -28,8 +28,8 @@ NAMES = "acceleration", "wall_mass", "free_mass", "wall_forbid_pull", "force"
 ACCELERATED = [name for name, kind in ESTIMATORS.items() if issubclass(kind, Accelerated)]
 SIZES = [
     ("mhz", "kalman", 0.25, 2),
-    ("paper", "levant-2", 0.06, 3),
-    ("narrow", "levant-3-implicit", 10.0, 4),
+    ("paper", "levant-2", 0.06, 5),
+    ("narrow", "levant-3-implicit", 10.0, 3),
     ("wide", "edge-kalman", 1e-6, 2),
     ("mhz", "edge-kalman", 1e7, 3),
 ]

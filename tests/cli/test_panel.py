@@ -2,6 +2,7 @@
 
 import re
 import socket
+import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -33,6 +34,16 @@ def test_its_end_leaves_no_process_and_a_board_is_not_asked_for_twice():
     assert code == 0, err
     assert children
     wait_until(lambda: not any(child.is_running() and child.status() != "zombie" for child in children))
+
+
+@pytest.mark.parametrize(("estimator", "said"), [("kalman", "true"), ("levant", "false")])
+def test_the_page_knows_whether_the_board_has_an_acceleration(estimator, said):
+    with (
+        TwinBoard(RegisterMap(load("mhz", {"controller.estimator": estimator}).spec)) as board,
+        started(HARDWALL, "panel", board.name) as process,
+        urllib.request.urlopen(line(process).removeprefix("page: "), timeout=60) as page,
+    ):
+        assert f"window.hardwallAccelerates = {said}<" in page.read().decode()
 
 
 def free_port() -> int:

@@ -35,6 +35,13 @@ def virtual() -> Iterator[VirtualBoard]:
         yield board
 
 
+@pytest.fixture(scope="module")
+def accelerated() -> Iterator[VirtualBoard]:
+    """A board whose estimator has an acceleration."""
+    with running(SCENE | {"controller.estimator": "kalman"}, "--tcp", "0", "--speed", str(2 * PACE)) as board:
+        yield board
+
+
 class Called(NamedTuple):
     """What came of a command that was called in this process."""
 
@@ -76,10 +83,24 @@ def test_connect_says_what_a_board_is(virtual, called):
     assert report["link"]["requests"] > 0
     values = {row["name"]: row["value"] for row in report["rows"]}
     assert values["supervisor_watchdog"] == pytest.approx(0.2)
+    assert report["acceleration_m_per_s2"] is None
+    assert "acceleration" not in values
     assert "commit" not in values
     shown = called("connect", virtual.tcp)
-    assert f"identity           {REGISTERS.identity}" in shown.stdout
+    assert re.search(rf"^identity +{REGISTERS.identity}", shown.stdout, re.MULTILINE)
     assert "0x00c8" in called("connect", virtual.tcp, "--registers").stdout
+
+
+def test_an_acceleration_is_reported_and_shown_where_a_board_has_one(accelerated, called):
+    done = called("connect", accelerated.path, "--json")
+    assert done.returncode == 0, done.stderr
+    check_text("connect", done.stdout)
+    assert isinstance(json.loads(done.stdout)["acceleration_m_per_s2"], float)
+    done = called("watch", accelerated.path, "--seconds", "0.2")
+    assert re.search(r" mm/s +-?[\d.]+ m/s\^2 +-?[\d.]+ N", done.stdout)
+    done = called("watch", accelerated.path, "--seconds", "0.2", "--json")
+    check_text("watch", done.stdout)
+    assert isinstance(json.loads(done.stdout.splitlines()[0])["acceleration_m_per_s2"], float)
 
 
 def test_set_writes_and_says_what_is_used(virtual, called):
@@ -146,6 +167,7 @@ def test_watch_shows_a_line_and_home_finds_the_index(virtual, called):
         code, out, err = ended(process)
     assert code == 0, err
     assert " mm/s " in out
+    assert "m/s^2" not in out
     done = called("home", virtual.path, "--seconds", "0.2")
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == (
@@ -182,6 +204,8 @@ def test_watch_shows_a_line_and_home_finds_the_index(virtual, called):
         (["capture", "PORT", "--before", "3000"], 2, "before must be 0 to 2047, not 3000"),
         (["capture", "PORT", "--last", "--arm"], 2, "--last reads a finished capture: no word, --arm, "),
         (["capture", "PORT", "--last", "--trigger", "trip"], 2, "--last reads a finished capture: no word, "),
+        (["capture", "PORT", "--last", "--acceleration"], 2, "--last reads a finished capture: no word, --arm, "),
+        (["capture", "PORT", "--acceleration"], 1, "the board has no acceleration: its estimator estimates only the "),
         (["capture", "PORT", "-o", "hit.csv"], 2, "--out must end in .npz, not 'hit.csv'"),
         (["connect", "PORT", "--identity", "no"], 1, "it has another bitstream"),
         (["connect", "/dev/hardwall-absent"], 1, "cannot be opened: there is no such port"),
@@ -235,6 +259,22 @@ def test_a_capture_by_hand_and_one_that_does_not_come(virtual, called):
     done = called("capture", virtual.path, "--trigger", "trip", "--before", "0", "--seconds", "2")
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == "hardwall: error: the capture is not DONE in 2 s: it is WAITING"
+
+
+def test_the_acceleration_is_captured_into_a_file_and_a_picture(accelerated, called, tmp_path):
+    files = "-o", tmp_path / "hit.npz", "--plot", tmp_path / "hit.png"
+    done = called("capture", accelerated.path, "--trigger", "hand", "--acceleration", *files, "--json")
+    assert done.returncode == 0, done.stderr
+    check_text("capture", done.stdout)
+    report = json.loads(done.stdout)
+    assert "speed_most_m_per_s" not in report
+    with np.load(tmp_path / "hit.npz") as saved:
+        assert "velocity_m_per_s" not in saved
+        assert abs(saved["acceleration_m_per_s2"]).max() == report["acceleration_most_m_per_s2"]
+    assert (tmp_path / "hit.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    # What is read again is what was recorded.
+    again = called("capture", accelerated.path, "--last", "--json")
+    assert json.loads(again.stdout) == report
 
 
 def test_a_capture_whose_file_cannot_be_written_is_read_again(virtual, called, monkeypatch, tmp_path):

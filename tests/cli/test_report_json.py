@@ -70,6 +70,14 @@ def test_a_linear_loop_without_a_limit_has_null_in_the_report_of_rates():
     assert report["linear_limits"]["rigid"] == [1e5, 1e6, None]
 
 
+@pytest.mark.parametrize("motion", ["velocity_m_per_s", "acceleration_m_per_s2"])
+def test_a_capture_has_the_largest_speed_or_the_largest_acceleration(motion):
+    report = results.captured(motion).report()
+    check("capture", report)
+    with pytest.raises(AssertionError, match=r"^capture: "):
+        check("capture", report | {"speed_most_m_per_s": 1.0, "acceleration_most_m_per_s2": 1.0})
+
+
 def test_hits_side_by_side_are_as_their_schema_says():
     report = results.hit_beside().report()
     check("hit", report)

@@ -1,18 +1,31 @@
 """Captures: what is asked of the board, and what its records become in SI units."""
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 
 from hardwall.host.capture import PART_RECORDS
 from hardwall.host.connect import connect
 from hardwall.host.errors import ForeignError, NotReadyError
+from hardwall.model.axis.axis import Axis
 from hardwall.model.axis.capture import DONE, STATE_FLAGS, WAITING
 from hardwall.model.axis.registers import RegisterMap
 from hardwall.model.checks import FieldError
+from hardwall.sim.scene.load import load
 from host.twin_board import TwinBoard
 from stimuli.captures import records, window
+from support.virtual_boards import PACE, SCENE, VirtualBoard, running
 
 PLACE = 100
+ACCELERATED = SCENE | {"controller.estimator": "levant-2"}
+"""The changes of a scene to an estimator with an acceleration."""
+
+
+@pytest.fixture(scope="module")
+def virtual() -> Iterator[VirtualBoard]:
+    with running(ACCELERATED, "--tcp", "0", "--speed", str(2 * PACE)) as board:
+        yield board
 
 
 def hold(board: TwinBoard, words: dict[str, np.ndarray]) -> None:
@@ -34,6 +47,7 @@ def test_records_become_arrays_in_si_units(board, axis, registers):
     np.testing.assert_array_equal(found.flags, words["flags"])
     period_s = decimation / registers.spec.sample_hz
     np.testing.assert_allclose(found.time_s, (np.arange(len(found.time_s)) - PLACE) * period_s, rtol=1e-12)
+    assert found.acceleration_m_per_s2 is None
     assert found.flag_names[: len(STATE_FLAGS)] == STATE_FLAGS
     assert len(found.flag_names) == len(registers.capture.flags)
     np.testing.assert_array_equal(found.flag("tripped"), words["flags"] >> 1 & 1)
@@ -63,9 +77,67 @@ def test_a_capture_can_be_saved(board, axis, registers, tmp_path):
     found = axis.capture.read()
     found.save(tmp_path / "capture.npz")
     with np.load(tmp_path / "capture.npz") as saved:
-        assert set(saved) == set(vars(found))
+        assert set(saved) == set(vars(found)) - {"acceleration_m_per_s2"}
         np.testing.assert_array_equal(saved["velocity_m_per_s"], found.velocity_m_per_s)
         assert saved["identity"] == registers.identity
+
+
+def test_records_may_have_the_acceleration(accelerated_board, accelerated_axis, accelerated, tmp_path):
+    board, axis, started = accelerated_board, accelerated_axis, []
+    board.react = lambda pulses: started.append(dict(board.server.file.active)) if "capture_start" in pulses else None
+    words = records(accelerated, 1, "acceleration")
+    hold(board, words)
+    axis.capture.start(acceleration=True)
+    found = axis.capture.read()
+    assert found.velocity_m_per_s is None
+    np.testing.assert_array_equal(found.acceleration_m_per_s2, words["acceleration"] * accelerated["acceleration"].lsb)
+    found.save(tmp_path / "capture.npz")
+    with np.load(tmp_path / "capture.npz") as saved:
+        assert set(saved) == set(vars(found)) - {"velocity_m_per_s"}
+        np.testing.assert_array_equal(saved["acceleration_m_per_s2"], found.acceleration_m_per_s2)
+    # Without a wish, the next one has the velocity again.
+    axis.capture.start()
+    assert [active["capture_acceleration"] for active in started] == [1, 0]
+    found = axis.capture.read()
+    assert found.acceleration_m_per_s2 is None
+    np.testing.assert_array_equal(found.velocity_m_per_s, words["acceleration"] * accelerated["velocity"].lsb)
+
+
+def test_a_board_without_an_acceleration_captures_none(board, axis):
+    started = []
+    board.react = started.extend
+    with pytest.raises(NotReadyError, match="the board has no acceleration: its estimator estimates only the velocity"):
+        axis.capture.start(acceleration=True)
+    assert started == []
+
+
+def test_the_acceleration_of_a_board_is_the_words_of_the_model(virtual):
+    """From the power-up on: the handle rests before the capture, and moves in it."""
+    spec, seen = load("seed-2011", ACCELERATED).spec, []
+    with connect(virtual.tcp, pace=PACE) as axis:
+        # The first count triggers.
+        axis.capture.start("rise", before=100, level_m=spec.count_m, acceleration=True)
+        axis.capture.until("WAITING", 60.0)
+        virtual.order("hold 3")
+        while axis.capture.state != "DONE":
+            seen.append(axis.status)
+        captured, trigger = axis.capture.read(), axis.read("capture_stamp")
+        registers = axis.device.registers
+    counts = np.round(captured.position_m / registers["count"].lsb).astype(np.int64)
+    record = Axis(spec).run(counts)
+    words = np.round(captured.acceleration_m_per_s2 / registers["acceleration"].lsb).astype(np.int64)
+    np.testing.assert_array_equal(words, record.acceleration)
+    np.testing.assert_allclose(captured.acceleration_m_per_s2, record.acceleration_m_per_s2, rtol=1e-12)
+    assert np.count_nonzero(np.diff(words)) > 1000
+    # The status is the acceleration of the record at its time, or of a neighbour.
+    found = 0
+    for status in seen:
+        clock = round(status.stamp_s * spec.clock_hz) - trigger
+        near = captured.place + clock // spec.clocks_per_sample
+        if 0 < near < len(words) - 1:
+            assert status.acceleration_m_per_s2 in captured.acceleration_m_per_s2[near - 1 : near + 2]
+            found += 1
+    assert found > 0
 
 
 def test_records_that_do_not_follow_each_other_are_refused(board, axis, registers):

@@ -68,6 +68,23 @@ def test_every_word_is_saved_as_it_is(board, axis, registers, tmp_path, end):
     assert {name: after[name] for name in words} == picked
 
 
+def test_a_file_has_the_virtual_masses_of_a_board_with_them(accelerated_axis, tmp_path):
+    axis, path = accelerated_axis, tmp_path / "words.toml"
+    axis.set(wall_mass=0.03, free_mass=-0.01)
+    Config.of(axis).write(path, axis.device)
+    for name, value in (("wall_mass", "0.03"), ("free_mass", "-0.01")):
+        most = f"{axis.device.registers[name].high * axis.device.registers[name].lsb:g}"
+        assert f"\n{name} = {value}  # kg, -{most} to {most}\n" in path.read_text()
+    axis.set(wall_mass=0, free_mass=0)
+    read = Config.read(path)
+    assert [(each.name, each.board, each.unit) for each in read.differences(axis)] == [
+        ("wall_mass", 0.0, "kg"),
+        ("free_mass", 0.0, "kg"),
+    ]
+    read.load(axis, read.differences(axis))
+    assert (axis.wall.mass, axis.free.mass) == pytest.approx((0.03, -0.01), abs=1e-5)
+
+
 def test_a_file_is_read_by_people(file, axis):
     text = file.read_text()
     assert f'identity = "{axis.device.identity}"' in text

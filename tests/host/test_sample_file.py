@@ -26,6 +26,7 @@ def test_a_file_is_read_as_it_was_written(board, axis, tmp_path):
     assert float(first["position_m"]) == sample.status.position_m
     assert (first["state"], first["flags"]) == ("ARMED", "encoder_illegal encoder_overspeed")
     assert (first["live"], second["live"], second["missed"]) == ("0", "", "7")
+    assert first["acceleration_m_per_s2"] == ""
     # Numbers alone are read by what reads numbers.
     read = np.genfromtxt(tmp_path / "log.csv", delimiter=",", names=True, usecols=("time_s", "force_n", "missed"))
     assert np.isnan(read["force_n"]).tolist() == [False, True]

@@ -111,9 +111,17 @@ def test_a_row_has_every_column(board, axis):
     assert (row["state"], row["causes"], row["missed"]) == ("TRIPPED", ["emergency_stop"], 0)
     assert row["flags"] == ["encoder_illegal", "encoder_overspeed"]
     assert row["position_m"] == 5 * axis.device.registers["count"].lsb
+    assert row["acceleration_m_per_s2"] is None
     silent = Sample(1.0, 2.0, None, 7).row
     assert tuple(silent) == COLUMNS
     assert [name for name, value in silent.items() if value is not None] == ["time_s", "unix_s", "missed"]
+
+
+def test_a_row_has_the_acceleration_of_a_board_that_has_one(accelerated_board, accelerated_axis, accelerated):
+    accelerated_board.show(acceleration=-7)
+    row = next(Samples(accelerated_axis)).row
+    assert tuple(row) == COLUMNS
+    assert row["acceleration_m_per_s2"] == -7 * accelerated["acceleration"].lsb
 
 
 @pytest.mark.parametrize("rate_hz", [0.0, -1.0, 1001.0, float("nan")])

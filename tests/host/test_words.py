@@ -44,6 +44,24 @@ def test_what_another_call_wrote_is_kept(board, axis, registers):
     assert (axis.wall.position, axis.supervisor.force_limit) == (pytest.approx(-3e-3), 7.5)
 
 
+def test_a_virtual_mass_is_a_word_of_the_wall_and_of_free_space(accelerated_board, accelerated_axis, accelerated):
+    accelerated_axis.wall.mass = 0.03
+    accelerated_axis.free.mass = -0.01
+    for name, mass_kg in (("wall_mass", 0.03), ("free_mass", -0.01)):
+        assert active(accelerated_board, accelerated, name) == round(mass_kg / accelerated[name].lsb)
+    found = accelerated_axis.wall.mass, accelerated_axis.free.mass
+    assert found == pytest.approx((0.03, -0.01), abs=accelerated["wall_mass"].lsb)
+    most = f"{accelerated['free_mass'].high * accelerated['free_mass'].lsb:g}"
+    with pytest.raises(FieldError, match=f"free_mass must be -{most} to {most} kg, not -0.06"):
+        accelerated_axis.free.mass = -0.06
+
+
+def test_a_board_without_a_virtual_mass_says_so(axis):
+    for group in (axis.wall, axis.free):
+        with pytest.raises(FieldError, match=r"word must be one of the board's, not '(wall|free)_mass'"):
+            group.mass = 0.01
+
+
 def test_what_a_host_before_has_written_is_kept(board, registers):
     with connect(board.name) as first:
         first.set(wall_stiffness=5e3, supervisor_watchdog=0.5)

@@ -13,6 +13,7 @@ import pytest
 from hardwall.model import Sampler, stamped
 from hardwall.model.axis.axis import Axis
 from hardwall.model.encoder import quadrature
+from hardwall.model.estimators.acceleration import Accelerated
 from hardwall.model.estimators.registry import ESTIMATORS
 from hardwall.model.sampler import pass_edges
 from hardwall.testing import rng
@@ -22,6 +23,7 @@ from stimuli.specs import PAPER, spec
 COUNT_M = 2.0**-20
 SPEC = replace(spec("paper", "fdm"), count_m=COUNT_M, actuation_hz=PAPER["sample_hz"])
 SOME = list(ESTIMATORS) if LONG else ["levant", "edge-kalman"]
+ACCELERATED = [name for name, design in ESTIMATORS.items() if issubclass(design, Accelerated)]
 WALL = {"wall_stiffness": 20e3, "wall_damping": 10.0, "encoder_glitch_clocks": 1}
 GRAY = (1, 3, 2, 0)
 """Levels of the pins, a | b << 1, in cells 0, 1, 2, 3 of a cycle."""
@@ -51,6 +53,25 @@ def edges_of(positions: list[float], clocks: int, first: int) -> tuple[list[int]
             at.append(first + k * clocks + 1 + min(share, clocks - 1))
             levels.append(GRAY[count % 4])
     return at, levels
+
+
+@pytest.mark.parametrize("backend", ["fixed", "float"])
+@pytest.mark.parametrize("estimator", ACCELERATED if LONG else ["edge-kalman", "levant-2"])
+def test_its_acceleration_is_that_of_the_axis(estimator, backend):
+    of, positions = replace(SPEC, estimator=estimator), walk(200)
+    sampler = Sampler(of, backend)
+    assert sampler.acceleration_m_per_s2 == 0
+    came = []
+    for position in positions:
+        sampler(position)
+        came.append(sampler.acceleration_m_per_s2)
+    clocks, levels = edges_of(positions, of.clocks_per_sample, of.design.timing.strobe)
+    axis = Axis(of, backend == "float")
+    record = stamped.run(axis, clocks, levels, len(positions), GRAY[math.floor(positions[0] / COUNT_M) % 4])
+    assert came == record.acceleration_m_per_s2.tolist()
+    assert max(came) > 0 > min(came)
+    # A copy has it before its next sample.
+    assert copy.deepcopy(sampler).acceleration_m_per_s2 == came[-1]
 
 
 @pytest.mark.parametrize("backend", ["fixed", "float"])
@@ -171,6 +192,7 @@ def test_before_the_first_sample():
     assert (sampler.state, sampler.velocity_m_per_s, sampler.count, sampler.flags) == (None, 0.0, 0, [])
     assert sampler(0.0) == 0.0
     assert sampler.state.decoder.count == 0
+    assert sampler.acceleration_m_per_s2 is None
 
 
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf, 2.0**33])

@@ -15,6 +15,7 @@ from hardwall.sim.estimates.replay import replay
 from hardwall.sim.pictures import (
     accuracy,
     bits,
+    capture,
     costs,
     cutoff,
     drop,
@@ -79,6 +80,8 @@ PICTURES = {
     "figure 2": lambda: accuracy.draw(results.rows()),
     "axes": lambda: several.draw(results.axes_costs()),
     "bits": lambda: bits.draw(results.bits_dropped()),
+    "capture": lambda: capture.draw(results.captured("velocity_m_per_s")),
+    "capture of accelerations": lambda: capture.draw(results.captured("acceleration_m_per_s2")),
     "response": lambda: response.draw(results.responses()),
     "mass": lambda: mass.draw(results.masses()),
     "costs": lambda: costs.draw(results.costs_of_boards()),

@@ -5,6 +5,8 @@ from functools import cache
 
 import numpy as np
 
+from hardwall.cli.capture import Captures
+from hardwall.host.capture import Captured
 from hardwall.model.estimators.levant import Gains
 from hardwall.sim.estimates import figures
 from hardwall.sim.loop.record import Overview, Trace
@@ -43,6 +45,25 @@ from hardwall.sim.walls.methods import Curve, methods
 from hardwall.sim.walls.zwidth import Map
 
 NOTHING = Effort("fixed", 0, 0.0)
+
+
+def captured(motion: str) -> Captures:
+    """Return a capture of a contact, whose records have an array `motion` of velocities or of accelerations."""
+    time_s = np.arange(-20, 60) * 1e-4
+    motions = dict.fromkeys(("velocity_m_per_s", "acceleration_m_per_s2")) | {motion: np.sin(100 * time_s)}
+    force_n, flags = np.minimum(-100 * time_s, 0.0), (time_s >= 0).astype(np.int64)
+    return Captures(
+        Captured(
+            time_s,
+            0.1 * time_s,
+            **motions,
+            force_n=force_n,
+            flags=flags,
+            flag_names=("contact",),
+            place=20,
+            identity="0" * 16,
+        )
+    )
 
 
 def hit(rms_m: float = 0.0, reached: bool = True) -> Hit:

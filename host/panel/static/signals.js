@@ -2,9 +2,14 @@
 
 // `column` is the place in a sample, `scale` how many of the unit the SI unit has, and `least` the smallest range that
 // follows the signal; `range` is the one that is set by hand, or null.
+const ACCELERATION = {
+  ...{ name: "acceleration", unit: "m/s\u00b2", column: 5, scale: 1, colour: "grey" },
+  ...{ least: 1, decimals: 2, shown: false, range: null },
+};
 export const SIGNALS = [
   { name: "position", unit: "mm", column: 1, scale: 1e3, colour: "blue", least: 1, decimals: 3, shown: true, range: null },
   { name: "velocity", unit: "mm/s", column: 2, scale: 1e3, colour: "green", least: 20, decimals: 1, shown: true, range: null },
+  ...(window.hardwallAccelerates ? [ACCELERATION] : []), // a board with an estimator that has one
   { name: "wall force", unit: "N", column: 3, scale: 1, colour: "violet", least: 1, decimals: 2, shown: false, range: null },
   { name: "force", unit: "N", column: 4, scale: 1, colour: "red", least: 1, decimals: 2, shown: true, range: null },
 ];

@@ -51,7 +51,15 @@ def test_it_shows_what_the_board_does(driver, board):
     assert number == len(samples) > 0
     wait_until(lambda: driver.samples_since(number)[1])
     assert driver.samples_since(number)[1][0].position_m == pytest.approx(3 * board_count_m(driver))
+    assert samples[-1].acceleration_m_per_s2 is None
     assert driver.samples_since(driver.samples_since(0)[0] + 5)[1] == []
+
+
+def test_it_keeps_the_acceleration_of_a_board_that_has_one(accelerated_board, accelerated):
+    accelerated_board.show(acceleration=-5)
+    with closing(Driver(lambda: connect(accelerated_board.name, answer_s=2.0))) as driver:
+        wait_until(lambda: driver.samples_since(0)[1])
+        assert driver.samples_since(0)[1][-1].acceleration_m_per_s2 == -5 * accelerated["acceleration"].lsb
 
 
 def board_count_m(driver: Driver) -> float:

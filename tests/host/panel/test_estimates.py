@@ -35,6 +35,14 @@ def test_records_in_a_row_are_one_run_of_the_model():
     assert np.abs(rows(records)[2:]).max(axis=1).min() > 1
 
 
+def test_an_estimator_with_an_acceleration_is_run_as_any_other():
+    spec = load("seed-2011", {"controller.estimator": "kalman"}).spec
+    estimates = Estimates(spec)
+    estimates.feed(COUNTS.tolist())
+    expected = Axis(spec).run(np.concatenate([[0], COUNTS])).velocity_m_per_s
+    np.testing.assert_array_equal(rows(estimates.since(0)[1])[0], expected[1:].astype(np.float32))
+
+
 def test_new_words_count_from_the_next_record_on():
     estimates = Estimates(SPEC)
     for stiffness in (1e3, 4e3):

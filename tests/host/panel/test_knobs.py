@@ -49,6 +49,16 @@ def test_units_are_those_of_hands():
     assert NAMES["supervisor_reference"].way is NAMES["wall_left"].way is Way.SWITCH
 
 
+def test_virtual_masses_are_of_the_wall_s_group_in_grams(accelerated_axis):
+    knobs = {knob.name: knob for knob in knobs_of(accelerated_axis.device)}
+    wall, free = knobs["wall_mass"], knobs["free_mass"]
+    assert (wall.spoken, free.spoken) == ("Virtual mass in the wall, g", "Virtual mass in free space, g")
+    for knob in (wall, free):
+        assert (knob.group, knob.way) == (Group.WALL, Way.CUBE)
+        assert (knob.shown(knob.least), knob.shown(knob.most)) == pytest.approx((-50.0, 50.0), abs=0.01)
+        assert knob.from_slider(0.5) == 0
+
+
 def test_every_setting_has_its_group(axis):
     knobs = knobs_of(axis.device)
     groups = {knob.name: knob.group for knob in knobs}

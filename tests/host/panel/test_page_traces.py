@@ -5,8 +5,8 @@ import re
 import pytest
 
 from support.browser_tests import browsers_or_skip
-from support.page_at_rest import SIZES
-from support.processes import wait_until
+from support.page_at_rest import PANEL, SIZES
+from support.processes import line, started, wait_until
 
 browsers = browsers_or_skip()
 LEFT, RIGHT, SHOWN_S = 58, 96, 10
@@ -71,6 +71,30 @@ def test_the_signals_that_are_chosen_are_drawn_for_as_long_as_the_page_lives(tab
         tab.page.get_by_role("checkbox", name=name, exact=True).uncheck()
     assert any("No signal is chosen" in text for text in tab.page.evaluate(TEXTS))
     wait_until(lambda: "no signal is chosen" in canvas.get_attribute("aria-label"))
+
+
+def test_a_board_with_an_acceleration_has_its_trace_and_captures_it(tab, chromium):
+    assert "acceleration" not in tab.of("signals", "SIGNALS.map((each) => each.name)")
+    assert not tab.page.get_by_label("Record").is_visible()
+    with started(*PANEL, "--set", "controller.estimator=kalman") as process:
+        other = browsers.Tab(chromium, line(process).removeprefix("page: "))
+        assert shown(other) == ["position", "velocity", "force"]
+        other.page.get_by_text("Signals and ranges").click()
+        other.page.get_by_role("checkbox", name="acceleration, m/s\u00b2", exact=True).check()
+        assert shown(other) == ["position", "velocity", "acceleration", "force"]
+        assert "acceleration, m/s\u00b2" in other.page.evaluate(TEXTS)
+        card = other.page.locator(".capture")
+        card.get_by_label("Record").click()
+        other.page.get_by_role("option", name="acceleration").click()
+        card.get_by_label("Trigger").click()
+        other.page.get_by_role("option", name="now").click()
+        card.get_by_text("Capture", exact=True).last.click()
+        wait_until(lambda: "records at" in card.locator(".state").inner_text())
+        names = """(chart) => getElement(Number(chart.id.slice(1))).chart.getOption().yAxis.map((each) => each.name)"""
+        chart = card.locator(".nicegui-echart")
+        wait_until(lambda: "acceleration (m/s\u00b2)" in chart.evaluate(names))
+        assert other.errors == []
+        other.page.context.close()
 
 
 def test_a_pause_holds_the_traces_while_the_data_goes_on_and_says_so(tab):

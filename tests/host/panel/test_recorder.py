@@ -1,6 +1,7 @@
 """A capture as tabs ask for it: begun, watched, and read between the looks at a board; and what ends it."""
 
 import dataclasses
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -89,6 +90,15 @@ def test_a_capture_is_begun_and_read_in_parts_between_looks(driver, board, regis
     recording = driver.view.recording
     assert (recording.state, recording.captured.place) == (IDLE, 7)
     np.testing.assert_array_equal(recording.captured.position_m, counts * registers["count"].lsb)
+
+
+def test_a_capture_has_the_acceleration_if_it_is_wanted(accelerated_board):
+    board, started = accelerated_board, []
+    board.react = lambda pulses: started.append(dict(board.server.file.active)) if "capture_start" in pulses else None
+    with closing(Driver(lambda: connect(board.name, answer_s=2.0))) as driver:
+        for wanted in (True, False):
+            driver.record(TAB, Wish(acceleration=wanted))
+            wait_until(lambda wanted=wanted: started and started[-1]["capture_acceleration"] == wanted)
 
 
 def test_a_capture_now_is_triggered_as_soon_as_it_waits(driver, board, started):

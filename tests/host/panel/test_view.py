@@ -8,7 +8,7 @@ from hardwall.host.panel.view import ADVICE, View, told
 from hardwall.host.status import State, Status, Trip
 from hardwall.model.axis.supervisor import CAUSES
 
-RESTS = Status(State.DISARMED, 0.0, 0.0, 0.0, 0.0, 0.0, True, True, True, (), False, None)
+RESTS = Status(State.DISARMED, 0.0, 0.0, None, 0.0, 0.0, 0.0, True, True, True, (), False, None)
 VIEW = View(status=RESTS, connected=True, values={"supervisor_force_limit": 12.0, "wall_stiffness": 2e3})
 
 
