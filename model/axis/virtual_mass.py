@@ -7,11 +7,11 @@ A positive M makes the handle heavier. A negative one makes it lighter: it compe
 In the wall the sum does not change the sign of the wall's force if the wall may not pull (`wall_forbid_pull`; a force
 law without this word may).
 
-Bounds. Both words are within `virtual_mass_max_kg`, which must be less than the mass of the handle. A word beyond it
-acts as the bound. Let the handle have the mass m, and the acceleration be known exactly, but late. In m a = -M a', with
-a' of one force period before, a grows from period to period if |M| > m, with either sign. So no larger M is stable
-for any estimator. An estimator's own delay and noise leave less: `docs/results/acceleration.md` has the maps. After
-reset both words are 0.
+Bounds. Both words are within `virtual_mass_max_kg`, rounded up to a word, which must be less than the mass of the
+handle. A word beyond it acts as the bound. Let the handle have the mass m, and the acceleration be known exactly, but
+late. In m a = -M a', with a' of one force period before, a grows from period to period if |M| > m, with either sign. So
+a larger M is not stable with an exact acceleration. An estimator's own delay and noise matter, too: `hardwall mass` has
+the maps. After reset both words are 0.
 
 Formats, with the force LSB r, the count q and the sample period tau:
 
@@ -35,7 +35,7 @@ from ..checks import FieldError
 from ..estimators.acceleration import acceleration_of
 from ..requirements import AxisRequirements
 from ..runtime.compiled import by_type, compiled, inlined
-from ..words import Word, gain_format
+from ..words import ROUNDING, Word, gain_format
 
 LATENCY = 1
 """Clocks from the wall's force to the force that is given on."""
@@ -102,9 +102,10 @@ class Design:
 
     def __init__(self, axis: AxisRequirements, acceleration: SQ, most_kg: float):
         unit_kg = axis.force_resolution_n / (axis.velocity_unit_m_per_s * axis.sample_hz)
-        gain = gain_format(most_kg / unit_kg)
+        # A bit is the sign's, and the bound is rounded up to a word.
+        gain = gain_format(most_kg / unit_kg * (1 + 2.0**-14))
         self.mass = SQ(gain.i + 1, gain.f - 1)
-        self.most = math.floor(most_kg / (self.mass.lsb * unit_kg))
+        self.most = math.ceil(most_kg / (self.mass.lsb * unit_kg) * (1 - ROUNDING))
         self.force, self.acceleration = axis.force, acceleration
         self.coarse = SQ(acceleration.i, max(min(acceleration.f, self.mass.i), 1 - acceleration.i))
         self.shift = self.mass.f + self.coarse.f

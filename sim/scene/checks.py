@@ -111,7 +111,7 @@ def _check_virtual_mass(scene: Scene) -> None:
     if scene.transmission is not None:
         masses["transmission.motor_mass_kg"] = scene.transmission.motor_mass_kg
     key = min(masses, key=masses.__getitem__)
-    if scene.virtual_mass.most_kg >= masses[key]:
+    if scene.spec.design.mass.words[0].si_max >= masses[key]:
         raise FieldError(FIELD, f"must be less than {key}, {masses[key]:g}, not {scene.virtual_mass.most_kg!r}")
 
 

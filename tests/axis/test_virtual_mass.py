@@ -185,8 +185,11 @@ def test_a_mass_is_newtons_second_law(floating):
 
 def test_a_word_beyond_the_bound_acts_as_the_bound():
     d = design("mhz", "kalman", 0.25)
-    assert d.words[0].si_max <= 0.25
-    assert d.words[0].si_max == pytest.approx(0.25, rel=1e-4)
+    assert d.words[0].si_max == pytest.approx(0.25, rel=2**-15)
+    for most_kg in (0.05, 0.1, 0.25, 1 / 3, 1e-4):
+        bounded = design("mhz", "kalman", most_kg)
+        for sign in (1, -1):
+            assert bounded.most - sign * bounded.words[0].from_si(sign * most_kg) in (0, 1)
     for sign in (1, -1):
         rows = [(d.acceleration.max // 9, 0, sign * most, 0, 0) for most in (d.most, d.most + 1, d.mass.max)]
         assert len(set(model(d, rows))) == 1
