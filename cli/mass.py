@@ -5,10 +5,12 @@ from typing import Annotated
 
 import typer
 
+from ..model.checks import shown
 from ..sim.jobs.store import Store
 from ..sim.scene.case import Case
 from ..sim.studies import mass
 from ..sim.walls.mapping import verdict
+from .errors import BadInput
 from .options import BackendOption, StartsOption, methods_option, numbers_of
 from .rates import RATES
 from .scenes import SceneArgument, curves_of, rates_of, refuse, refuse_for_maps
@@ -31,6 +33,12 @@ def command(
             show_default=",".join(f"{share:g}" for share in mass.SHARES),
         ),
     ] = None,
+    walls: Annotated[
+        str,
+        typer.Option(
+            metavar="K:B,...", help="walls by stiffness and damping, N/m and N s/m; a soft one is nearly free space"
+        ),
+    ] = ",".join(f"{wall.stiffness_n_per_m:g}:{wall.damping_n_s_per_m:g}" for wall in mass.WALLS),
     starts: StartsOption = 5,
     backend: BackendOption = "fixed",
 ) -> None:
@@ -43,7 +51,19 @@ def command(
     shares = list(mass.SHARES)
     if masses is not None:
         shares = sorted(numbers_of(masses, "--masses", -most, most, "of the handle's mass"))
-    settings = mass.settings_of(curves_of(wanted or ",".join(mass.METHODS)), rates_hz)
+    settings = mass.settings_of(curves_of(wanted or ",".join(mass.METHODS)), rates_hz, _walls(walls))
     run = partial(options.results, f"{case.scene.name}, virtual masses", verdict, store=Store("zwidth", options.resume))
     results = run(mass.jobs(case, settings, shares, starts, backend))
     options.finish(mass.study(case, settings, shares, starts, results))
+
+
+def _walls(text: str) -> list[mass.Wall]:
+    """Return the walls of a list K:B,..."""
+    walls = []
+    for word in text.split(","):
+        parts = word.split(":")
+        if len(parts) != 2:
+            raise BadInput(f"--walls must be pairs K:B of N/m and N s/m, not {shown(word)}")
+        stiffness, damping = (numbers_of(part, "--walls", 0.0, 1e9, "N/m and N s/m")[0] for part in parts)
+        walls.append(mass.Wall(stiffness, damping))
+    return list(dict.fromkeys(walls))

@@ -10,6 +10,7 @@ from amaranth.lib.data import ArrayLayout
 from hardwall.model.arithmetic.fixed import SQ, UQ, Format
 from hardwall.model.axes.axis import AxesSpec
 from hardwall.model.axis.design import ILLEGAL_WIDTH
+from hardwall.model.estimators.acceleration import Accelerated
 from hardwall.model.spec import AxisSpec
 
 from .axes.axis import Axes
@@ -43,6 +44,7 @@ MEANINGS = {
     "count": "position, live",
     "sampled_count": "position that a sample took; it changes with the velocity that was estimated from it",
     "velocity": "estimate of the last sample",
+    "acceleration": "second output of the estimator, with `velocity`",
     "wall_force": "the wall's force on the handle at the last sample",
     "flags": "sticky",
     "stepped": "high for one clock with the count of a new edge",
@@ -146,7 +148,12 @@ def _quantities(spec: AxisSpec | AxesSpec) -> dict[str, Quantity]:
     stamp = Quantity(UQ(spec.stamp_width, 0), 1 / spec.clock_hz, "s")
     velocity = Quantity(spec.design.estimator.velocity, spec.velocity_unit_m_per_s, "m/s")
     counts = ("count", "sampled_count", "preload_count", "index_count", "estimated_count", "record_count")
+    estimator, accelerations = spec.design.estimator, {}
+    if isinstance(estimator, Accelerated):
+        unit = spec.velocity_unit_m_per_s * spec.sample_hz
+        accelerations = {"acceleration": Quantity(estimator.acceleration, unit, "m/s^2")}
     return {
+        **accelerations,
         **dict.fromkeys(counts, count),
         **dict.fromkeys(("drive", "wall_force", "record_drive", "record_wall_force"), force),
         **dict.fromkeys(("stamp", "stamp_a_rise", "stamp_b_rise", "stamp_a_fall", "stamp_b_fall"), stamp),

@@ -234,9 +234,8 @@ class Axis(Component):
             m.d.comb += [
                 mass.strobe.eq(estimator.valid),
                 mass.acceleration.eq(estimator.acceleration),
-                mass.wall_forbid_pull.eq(active.get("wall_forbid_pull", 0)),
                 mass.forced.eq(wall.valid),
-                mass.force.eq(wall.force),
+                *given(mass, ports(wall, ("force", "may_be_positive", "may_be_negative"))),
             ]
             force, forced = mass.given, mass.valid
         if design.passivity is not None:

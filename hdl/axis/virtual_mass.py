@@ -15,10 +15,10 @@ class VirtualMass(Block):
 
     Equation:
 
-        mass  = wall_mass where force is not 0, else free_mass, within -design.most to design.most
+        mass  = wall_mass where the wall acts, else free_mass, within -design.most to design.most
         given = force - mass acceleration
 
-    With `wall_forbid_pull` the sum never has the sign against the wall's force: it is then 0.
+    Where the wall acts, a sum with a sign that its force may not have is 0.
 
     Latency: `latency` clocks from `forced` to `valid`. A sample's `forced` comes `design.behind` clocks or more after
     its `strobe`, and not after the next one's.
@@ -39,12 +39,12 @@ class VirtualMass(Block):
         With `strobe`: acceleration, counts a sample^2.
     wall_mass, free_mass : In(SQ)
         Force LSB a count/sample^2; constant from the clock before `strobe` to `strobe`.
-    wall_forbid_pull : In(1)
-        With `strobe`: 1: the sum does not pull.
     forced : In(1)
         Pulse: the same sample's force is there.
     force : In(SQ)
         With `forced`: the wall's force on the handle, force LSB.
+    may_be_positive, may_be_negative : In(1)
+        With `forced`: the signs that the wall's force may have there; neither in free space.
     given : Out(SQ)
         The force that is given on, force LSB; constant from one `valid` to the next.
     valid : Out(1)
@@ -66,9 +66,9 @@ class VirtualMass(Block):
             "strobe": In(1),
             "acceleration": In(shape(design.acceleration)),
             **{word.name: In(shape(word.format)) for word in design.words},
-            "wall_forbid_pull": In(1),
             "forced": In(1),
             "force": In(shape(design.force)),
+            **dict.fromkeys(("may_be_positive", "may_be_negative"), In(1)),
             "given": Out(shape(design.force)),
             "valid": Out(1),
         }
@@ -77,15 +77,13 @@ class VirtualMass(Block):
         m = Module()
         design = self.design
         in_wall, in_free_space = self._inertia(m, "wall", self.wall_mass), self._inertia(m, "free", self.free_mass)
-        touches = self.force.any()
-        total, forbidden = Signal(signed(design.inertia.width + 1)), Signal()
-        m.d.comb += total.eq(self.force - Mux(touches, in_wall, in_free_space))
-        turned = forbidden & touches & (total[-1] ^ self.force[-1])
+        acts = self.may_be_positive | self.may_be_negative
+        total = Signal(signed(design.inertia.width + 1))
+        m.d.comb += total.eq(self.force - Mux(acts, in_wall, in_free_space))
+        allowed = ~acts | Mux(total[-1], self.may_be_negative, self.may_be_positive)
         m.d.sync += self.valid.eq(self.forced)
-        with m.If(self.strobe):
-            m.d.sync += forbidden.eq(self.wall_forbid_pull)
         with m.If(self.forced):
-            m.d.sync += self.given.eq(Mux(turned, 0, held(total, 0, len(self.force))))
+            m.d.sync += self.given.eq(Mux(allowed, held(total, 0, len(self.force)), 0))
         return m
 
     def _inertia(self, m: Module, name: str, word: Value) -> Signal:

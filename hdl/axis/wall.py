@@ -7,6 +7,7 @@ from hardwall.model.axis.wall import Design
 
 from ..arithmetic.fixed import shape, shift_floor
 from ..block import Block
+from ..wires import given
 
 PART_BITS = 16
 """Bits of an operand that a multiplier of every part takes beside a gain word; a wider one is split."""
@@ -77,6 +78,9 @@ class Wall(Block):
         All these words are constant from the clock after a sample's `lead` to its `strobe`.
     force : Out(SQ)
         Force on the handle, force LSB; constant from one `valid` to the next.
+    may_be_positive, may_be_negative : Out(1)
+        If a virtual mass follows, with `force`: the signs that a force at this count may have; neither in free space,
+        or if the wall has neither a spring nor a damper.
     valid : Out(1)
         High for one clock.
 
@@ -99,6 +103,7 @@ class Wall(Block):
             "velocity": In(shape(design.velocity)),
             **{word.name: In(shape(word.format)) for word in design.words},
             "force": Out(shape(design.force)),
+            **(dict.fromkeys(("may_be_positive", "may_be_negative"), Out(1)) if design.borne else {}),
             "valid": Out(1),
         }
 
@@ -160,4 +165,14 @@ class Wall(Block):
         within = (total >> design.push)[: design.force.width].as_signed()
         with m.If(summed):
             m.d.sync += self.force.eq(Mux(Mux(sign, negative, positive), Mux(limited, limit, within), 0))
+        if design.borne:
+            self._say_where_it_acts(m, placed, summed, {"may_be_positive": positive, "may_be_negative": negative})
         return m
+
+    def _say_where_it_acts(self, m: Module, placed: Signal, summed: Signal, may_be: dict[str, Signal]) -> None:
+        """Give the signs that the force may have, with the force; a wall without a spring and a damper has none."""
+        exists = Signal()
+        with m.If(placed):
+            m.d.sync += exists.eq(self.wall_stiffness.any() | self.wall_damping.any())
+        with m.If(summed):
+            m.d.sync += given(self, {name: allowed & exists for name, allowed in may_be.items()})

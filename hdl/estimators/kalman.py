@@ -1,6 +1,6 @@
 """All-integrator Kalman filter with steady-state gains."""
 
-from amaranth.hdl import Module, Signal, signed
+from amaranth.hdl import Module, Mux, Signal, signed
 
 from hardwall.model.estimators.kalman import Design
 
@@ -58,6 +58,10 @@ class Estimator(AcceleratedBlock):
         term = Signal(signed(len(product) - min(0, *design.shifts)))
         total = Signal(signed(max(len(term), len(predicted), len(a)) + 1))
 
+        # With two integrators there is no third state. The word is a sample's from the clock after its strobe on.
+        kept = Signal.like(a)
+        m.d.comb += kept.eq(Mux(self.kalman_acceleration == 0, 0, a))
+
         def scaled(shift):
             return term.eq(shift_floor(product, shift))
 
@@ -73,7 +77,8 @@ class Estimator(AcceleratedBlock):
             "DIFFERENCE": [
                 d.eq(limited),
                 self.saturated[0].eq(limited != moved),
-                predicted.eq(v + (a >> (design.a.f - design.v.f))),
+                predicted.eq(v + (kept >> (design.a.f - design.v.f))),
+                a.eq(kept),
             ],
             "PREDICT": [behind.eq(lead - (d << design.lead.f)), twice_moved.eq(v + predicted)],
             "DISTANCE": [distance.eq(behind + (twice_moved >> (design.v.f - design.lead.f + 1)))],
@@ -105,9 +110,7 @@ class Estimator(AcceleratedBlock):
 
         def forget(fresh):
             with m.If(fresh):
-                m.d.sync += [lead.eq(0), v.eq(0)]
-            with m.If(fresh | (self.kalman_acceleration == 0)):
-                m.d.sync += a.eq(0)
+                m.d.sync += [lead.eq(0), v.eq(0), a.eq(0)]
 
         self._step_by_step(m, moved, forget, sequence)
         return m

@@ -40,8 +40,7 @@ def step(
     """
     estimator, velocity, estimator_flags = estimate(params.estimator, state.estimator, seen, restart)
     force = wall.render(params.wall, seen.count, velocity)
-    acceleration = virtual_mass.sensed(params.mass, params.estimator, estimator)
-    borne = virtual_mass.weighed(params.mass, acceleration, force)
+    borne = virtual_mass.borne(params.mass, params.wall, params.estimator, estimator, seen.count, force)
     observed, given, acted = passivity.step(
         params.passivity, state.passivity, seen.count, restart, velocity, borne, state.output.drive
     )

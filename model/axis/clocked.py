@@ -85,8 +85,7 @@ def _take(params, state, outputs, made, k):
     seen = quadrature.seen(state.decoder)
     estimator, velocity, raised = estimate(params.estimator, state.axis.estimator, seen, state.restart)
     force = wall.render(params.wall, seen.count, velocity)
-    acceleration = virtual_mass.sensed(params.mass, params.estimator, estimator)
-    borne = virtual_mass.weighed(params.mass, acceleration, force)
+    borne = virtual_mass.borne(params.mass, params.wall, params.estimator, estimator, seen.count, force)
     fault = quadrature.fault(state.decoder)
     keep(made, k, velocity, params.estimator, estimator)
     outputs.wall_force[k] = force

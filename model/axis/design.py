@@ -123,7 +123,7 @@ class Design:
         self.gains = gains
         self.decoder = quadrature.Params(requirements.count_width, requirements.stamp_width, ILLEGAL_WIDTH)
         self.estimator = chosen(requirements, gains)
-        self.wall = wall.Design(requirements, self.estimator.velocity, coupling)
+        self.wall = wall.Design(requirements, self.estimator.velocity, coupling, mass_max_kg is not None)
         self.mass = self._mass(mass_max_kg)
         self.passivity = passivity.Design(requirements, self.estimator.velocity) if passive else None
         self.output = output.Design(requirements)
@@ -140,9 +140,9 @@ class Design:
             Word("encoder_invert", UQ(1, 0), 1.0, "", 0, "1: count the other way"),
             *self.estimator.words,
             *self.wall.words,
-            *(self.mass.words if self.mass else ()),
             *(self.passivity.words if self.passivity else ()),
             *self.output.words,
+            *(self.mass.words if self.mass else ()),
         )
         flags = ENCODER_FLAGS, self.estimator.flags, self.output.flags, self.passivity.flags if self.passivity else ()
         self.flags = tuple(chain(*flags))
@@ -205,7 +205,7 @@ class Design:
         selected = self.estimator.outputs[words.get(self.estimator.output_word(), 0)]
         mass: virtual_mass.FloatParams | virtual_mass.Absent = virtual_mass.ABSENT
         if self.mass:
-            mass = self.mass.float_params(si.get("wall_mass", 0.0), si.get("free_mass", 0.0), words)
+            mass = self.mass.float_params(si.get("wall_mass", 0.0), si.get("free_mass", 0.0))
         controller: passivity.FloatParams | passivity.Absent = passivity.ABSENT
         if self.passivity:
             controller = self.passivity.float_params(si.get("passivity_damping", 0.0))

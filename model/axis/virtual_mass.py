@@ -1,11 +1,11 @@
 """Virtual mass: a force against the acceleration of the handle, in the wall and in free space.
 
-    M = wall_mass where the wall has a force, else free_mass
+    M = wall_mass where the wall acts, else free_mass
     given = force - M acceleration                              on the handle
 
 A positive M makes the handle heavier. A negative one makes it lighter: it compensates a part of the handle's inertia.
-In the wall the sum does not change the sign of the wall's force if the wall may not pull (`wall_forbid_pull`; a force
-law without this word may).
+In a wall that may not pull (`wall_forbid_pull`) the sum does not pull either, also where the wall's force is 0. Where
+a wall acts is `wall.acts`: a force law of one's own that is to have a virtual mass has a variant of it.
 
 Bounds. Both words are within `virtual_mass_max_kg`, rounded up to a word, which must be less than the mass of the
 handle. A word beyond it acts as the bound. Let the handle have the mass m, and the acceleration be known exactly, but
@@ -36,6 +36,7 @@ from ..estimators.acceleration import acceleration_of
 from ..requirements import AxisRequirements
 from ..runtime.compiled import by_type, compiled, inlined
 from ..words import ROUNDING, Word, gain_format
+from .wall import acts
 
 LATENCY = 1
 """Clocks from the wall's force to the force that is given on."""
@@ -58,7 +59,6 @@ class Params(NamedTuple):
 
     in_wall: int
     in_free_space: int
-    forbid_pull: int
     acceleration_shift: int
     mass_shift: int
     inertia_max: int
@@ -70,7 +70,6 @@ class FloatParams(NamedTuple):
 
     in_wall: float
     in_free_space: float
-    forbid_pull: int
     force_max: float
 
 
@@ -120,7 +119,7 @@ class Design:
             raise FieldError(FIELD, f"must be {accepted}, not {most_kg!r}")
         bounds = -self.most, self.most
         self.words = (
-            Word("wall_mass", self.mass, unit_kg, "kg", 0, "virtual mass where the wall has a force", *bounds),
+            Word("wall_mass", self.mass, unit_kg, "kg", 0, "virtual mass where the wall acts", *bounds),
             Word("free_mass", self.mass, unit_kg, "kg", 0, "virtual mass elsewhere; it is below 0 to lighten", *bounds),
         )
 
@@ -129,84 +128,77 @@ class Design:
         return Params(
             in_wall=saturate(words["wall_mass"], -self.most, self.most),
             in_free_space=saturate(words["free_mass"], -self.most, self.most),
-            forbid_pull=words.get("wall_forbid_pull", 0),
             acceleration_shift=self.acceleration.f - self.coarse.f,
             mass_shift=self.shift,
             inertia_max=self.inertia.max,
             force_max=self.force.max,
         )
 
-    def float_params(self, wall_kg: float, free_kg: float, words: dict[str, int]) -> FloatParams:
+    def float_params(self, wall_kg: float, free_kg: float) -> FloatParams:
         """Return the float64 kernel's parameters, with the masses unrounded."""
         unit_kg = self.words[0].si_per_unit
-        return FloatParams(
-            wall_kg / unit_kg, free_kg / unit_kg, words.get("wall_forbid_pull", 0), float(self.force.max)
-        )
+        return FloatParams(wall_kg / unit_kg, free_kg / unit_kg, float(self.force.max))
 
 
 @by_type
-def sensed(params, estimator, state):
-    """Return the acceleration of the last sample, a word or counts a sample^2; 0 for an axis without a virtual mass.
-
-    Args:
-        params: `Params`, `FloatParams` or `ABSENT`.
-        estimator: the parameters of the estimator.
-        state: what the estimator has returned.
-    """
-
-
-@sensed.register(Absent)
-@inlined
-def _not_sensed(params, estimator, state):
-    return 0
-
-
-@compiled
-def _sensed(params, estimator, state):
-    return acceleration_of(estimator, state)
-
-
-sensed.register(Params)(_sensed)
-sensed.register(FloatParams)(_sensed)
-
-
-@by_type
-def weighed(params, acceleration, force):
-    """Return the force that is given on, force LSB.
+def borne(params, wall, estimator, state, count, force):
+    """Return the force of a sample behind the virtual mass, force LSB.
 
     Args:
         params: `Params` (integer words), `FloatParams` (float64), or `ABSENT`: the force is given on as it is.
-        acceleration: word of the estimator's acceleration (float: counts a sample^2).
+        wall, estimator: the parameters of these blocks.
+        state: what the estimator has returned.
+        count: position, counts, a signed word.
         force: the wall's force on the handle, force LSB.
     """
 
 
-@weighed.register(Absent)
+@borne.register(Absent)
 @inlined
-def _not_weighed(params, acceleration, force):
+def _not_borne(params, wall, estimator, state, count, force):
     return force
 
 
 @compiled
-def _sum(params, force, inertia):
-    """Return the force less what the mass takes, within the range of the force, and of its sign if it must be."""
-    most = params.force_max
-    low = 0 * most if params.forbid_pull and force > 0 else -most
-    high = 0 * most if params.forbid_pull and force < 0 else most
-    return saturate(force - inertia, low, high)
+def _borne(params, wall, estimator, state, count, force):
+    positive, negative = acts(wall, count)
+    return weighed(params, acceleration_of(estimator, state), force, positive, negative)
+
+
+borne.register(Params)(_borne)
+borne.register(FloatParams)(_borne)
+
+
+@by_type
+def weighed(params, acceleration, force, positive, negative):
+    """Return the force less what the mass takes, force LSB.
+
+    Args:
+        params: `Params` or `FloatParams`.
+        acceleration: word of the estimator's acceleration (float: counts a sample^2).
+        force: the wall's force on the handle, force LSB.
+        positive, negative: the signs that the force may have; neither in free space: see `wall.acts`.
+    """
+
+
+@compiled
+def _limited(params, total, positive, negative):
+    """Return a sum within the range of the force, and with a sign that it may have."""
+    most, free = params.force_max, not (positive or negative)
+    return saturate(total, -most if negative or free else 0 * most, most if positive or free else 0 * most)
 
 
 @weighed.register(Params)
 @compiled
-def word_weighed(params, acceleration, force):
-    mass = params.in_wall if force != 0 else params.in_free_space
+def word_weighed(params, acceleration, force, positive, negative):
+    mass = params.in_wall if positive or negative else params.in_free_space
     product = mass * shift_floor(acceleration, params.acceleration_shift)
-    inertia = shift_round_half_up(product, params.mass_shift)
-    return _sum(params, force, saturate(inertia, -params.inertia_max, params.inertia_max))
+    inertia = saturate(shift_round_half_up(product, params.mass_shift), -params.inertia_max, params.inertia_max)
+    return _limited(params, force - inertia, positive, negative)
 
 
 @weighed.register(FloatParams)
 @compiled
-def float_weighed(params, acceleration, force):
-    mass = params.in_wall if force != 0.0 else params.in_free_space
-    return _sum(params, force, mass * acceleration)
+def float_weighed(params, acceleration, force, positive, negative):
+    mass = params.in_wall if positive or negative else params.in_free_space
+    return _limited(params, force - mass * acceleration, positive, negative)

@@ -90,9 +90,10 @@ class Design:
         axis: the axis.
         velocity: format of the estimator's velocity.
         coupling: whether the surface may move, and hold on both sides.
+        borne: whether a virtual mass follows, which asks where the wall acts.
 
     Attributes:
-        coupling: as given.
+        coupling, borne: as given.
         stiffness, damping: gain formats.
         depth: format of the depth.
         coarse: format of the velocity as the damper takes it.
@@ -110,12 +111,12 @@ class Design:
     latency = LATENCY
     lead = interval = LEAD
 
-    def __init__(self, axis: AxisRequirements, velocity: SQ, coupling: bool = False):
+    def __init__(self, axis: AxisRequirements, velocity: SQ, coupling: bool = False, borne: bool = False):
         q, r, tau = axis.count_m, axis.force_resolution_n, 1 / axis.sample_hz
         self.count_width = axis.count_width
         self.force = axis.force
         self.velocity = velocity
-        self.coupling = coupling
+        self.coupling, self.borne = coupling, borne
         self.stiffness = gain_format(axis.stiffness_max_n_per_m * q / r)
         self.damping, self.coarse, whole = damper_formats(axis, velocity)
         self.surface = whole if coupling else self.coarse
@@ -230,6 +231,27 @@ def float_step(params, count, velocity):
     if params.forbid_pull:
         push = max(push, 0.0)
     return push if params.left else -push
+
+
+@by_type
+def acts(params, count):
+    """Return whether the force at a position may be positive, and whether it may be negative; neither in free space.
+
+    A wall without a spring and a damper is free space.
+
+    Args:
+        params, count: as of `render`.
+    """
+
+
+@compiled
+def _acts(params, count):
+    inside = (params.two_sided or _depth(params, count) > 0) and (params.stiffness != 0 or params.damping != 0)
+    return int(inside and (params.left or not params.forbid_pull)), int(inside and not params.left * params.forbid_pull)
+
+
+acts.register(Params)(_acts)
+acts.register(FloatParams)(_acts)
 
 
 @by_type

@@ -4,12 +4,14 @@ The wall has the mass. The softest wall here hardly pushes, and shows what free 
 the handle comes to rest from every start.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ...model.runtime.result import Summary, Table, table_of
 from ..jobs import store
 from ..scene.case import Case
+from ..scene.errors import SceneError
 from ..walls.hit import STABLE
 from ..walls.mass_theory import stable_shares
 from ..walls.methods import Curve
@@ -33,7 +35,9 @@ class Wall(NamedTuple):
 
 
 WALLS = (Wall(200.0, 5.0), Wall(10e3, 20.0), Wall(40e3, 60.0))
-"""The founding paper's wall, a stiffer one, and one that is hardly there."""
+"""A wall that is hardly there, the founding paper's, and a stiffer one."""
+NOT_IN_THEORY = "coupling", "passivity", "motor", "transmission", "hand"
+"""Sections of a scene that the theory of a rigid handle does not know."""
 
 
 class Setting(NamedTuple):
@@ -130,10 +134,10 @@ def rate_text(rate_hz: int | None) -> str:
     return "own rates" if rate_hz is None else f"{rate_hz / 1e3:g} kHz"
 
 
-def settings_of(curves: list[Curve], rates_hz: list[int]) -> list[Setting]:
+def settings_of(curves: list[Curve], rates_hz: list[int], walls: Sequence[Wall] = WALLS) -> list[Setting]:
     """Return every setting: at the scene's own rates, and at others."""
     rates = (None, *rates_hz)
-    return [Setting(curve, rate_hz, wall) for wall in WALLS for curve in curves for rate_hz in rates]
+    return [Setting(curve, rate_hz, wall) for wall in walls for curve in curves for rate_hz in rates]
 
 
 def case_of(case: Case, setting: Setting, share: float) -> Case:
@@ -148,9 +152,14 @@ def jobs(case: Case, settings: list[Setting], shares: list[float], starts: int, 
     """Return the hits, as jobs of `walls.mapping.verdict`: starts within shares within settings.
 
     Raises:
-        SceneError: if a case is not valid, or has a coupling.
+        SceneError: if a case is not valid, or the theory does not know its device.
     """
-    case.without_coupling("the theory beside it is of a wall")
+    scene = case.scene
+    for section in NOT_IN_THEORY:
+        if getattr(scene, section) is not None:
+            raise SceneError(f"{scene.name}: {section} must be absent: the theory beside the hits is of a rigid handle")
+    if scene.amplifier is not None and scene.amplifier.bandwidth_hz is not None:
+        raise SceneError(f"{scene.name}: amplifier.bandwidth_hz must be absent: the theory knows only a delay")
     common, made = {"sources": store.sources(), "backend": backend}, []
     for setting in settings:
         for share in shares:

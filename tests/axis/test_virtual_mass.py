@@ -24,7 +24,7 @@ from stimuli.lengths import some_of
 from stimuli.magnitudes import magnitudes
 from stimuli.specs import spec
 
-NAMES = "acceleration", "wall_mass", "free_mass", "wall_forbid_pull", "force"
+NAMES = "acceleration", "wall_mass", "free_mass", "may_be_positive", "may_be_negative", "force"
 ACCELERATED = [name for name, kind in ESTIMATORS.items() if issubclass(kind, Accelerated)]
 SIZES = [
     ("mhz", "kalman", 0.25, 2),
@@ -49,7 +49,7 @@ def stimulus(d: virtual_mass.Design, samples: int):
     a, m, f = d.acceleration, d.mass, d.force
     extremes = (
         (a.min, a.min + 1, -1, 0, 1, a.max), (m.min, -d.most - 1, -d.most, -1, 0, 1, d.most, d.most + 1, m.max),
-        (m.min, 0, m.max), (0, 1), (f.min, -f.max, -1, 0, 1, f.max),
+        (m.min, 0, m.max), (0, 1), (0, 1), (f.min, -f.max, -1, 0, 1, f.max),
     )  # fmt: skip
     yield from itertools.product(*extremes)
     random = rng()
@@ -57,24 +57,24 @@ def stimulus(d: virtual_mass.Design, samples: int):
         magnitudes(random, a.min, a.max, samples, a.width),
         magnitudes(random, m.min, m.max, samples, m.width),
         magnitudes(random, m.min, m.max, samples, m.width),
-        random.integers(0, 2, samples),
+        *random.integers(0, 2, (2, samples)),
         np.where(random.random(samples) < 0.3, 0, magnitudes(random, f.min, f.max, samples, f.width)),
     )
     for row in zip(*(column.tolist() for column in columns), strict=True):
         yield row
         # The same in free space, with either mass; and where the sum is a few LSB from zero.
-        yield *row[:4], 0
-        yield row[0], row[2], row[1], row[3], 0
+        yield *row[:3], 0, 0, 0
+        yield row[0], row[2], row[1], 0, 0, 0
         near = math.floor(Fraction(row[1] * (row[0] >> a.f - d.coarse.f)) / Fraction(2) ** d.shift)
         if 0 < abs(near) <= f.max - 4:
-            yield *row[:4], near + int(random.integers(-3, 4))
+            yield *row[:5], near + int(random.integers(-3, 4))
 
 
 def model(d: virtual_mass.Design, rows) -> list[int]:
     given = []
-    for acceleration, wall_mass, free_mass, forbid_pull, force in rows:
-        words = {"wall_mass": wall_mass, "free_mass": free_mass, "wall_forbid_pull": forbid_pull}
-        given.append(virtual_mass.weighed(d.params(words), acceleration, force))
+    for acceleration, wall_mass, free_mass, positive, negative, force in rows:
+        params = d.params({"wall_mass": wall_mass, "free_mass": free_mass})
+        given.append(virtual_mass.weighed(params, acceleration, force, positive, negative))
     return given
 
 
@@ -99,9 +99,9 @@ async def the_force_is_0_after_reset_and_constant_from_one_valid_to_the_next(dut
     await bench.reset()
     given = bench.reader("given")
     for row in (
-        (d.acceleration.max, d.most, 0, 0, 1),
-        (d.acceleration.min, 0, d.most, 1, 0),
-        (0, 0, 0, 0, d.force.max),
+        (d.acceleration.max, d.most, 0, 1, 1, 1),
+        (d.acceleration.min, 0, d.most, 0, 0, 0),
+        (0, 0, 0, 1, 0, d.force.max),
     ):
         bench.drive(**dict(zip(NAMES, row, strict=True)), strobe=1)
         for clock in range(component.latency + 3):
@@ -120,12 +120,13 @@ def test_rtl(name, estimator, most_kg, behind):
 
 def oracle(d: virtual_mass.Design, row: tuple[int, ...]) -> int:
     """Return the force that is given on, by the module's words, in exact rationals."""
-    acceleration, wall_mass, free_mass, forbid_pull, force = row
-    mass = max(-d.most, min(wall_mass if force else free_mass, d.most))
+    acceleration, wall_mass, free_mass, positive, negative, force = row
+    inside = positive or negative
+    mass = max(-d.most, min(wall_mass if inside else free_mass, d.most))
     coarse = math.floor(Fraction(acceleration, 2**d.acceleration.f) * Fraction(2) ** d.coarse.f)
     inertia = math.floor(Fraction(mass) * coarse / Fraction(2) ** d.shift + Fraction(1, 2))
     total = max(-d.force.max, min(force - inertia, d.force.max))
-    return 0 if forbid_pull and total * force < 0 else total
+    return 0 if inside and not (negative if total < 0 else positive) else total
 
 
 @pytest.mark.parametrize(("name", "estimator", "most_kg", "behind"), SIZES)
@@ -140,13 +141,12 @@ def test_fixed_point_is_within_a_force_lsb_of_float(name, estimator, most_kg, be
     d, compared = design(name, estimator, most_kg), 0
     unit_kg = d.words[0].si_per_unit * d.mass.lsb
     for row in stimulus(d, 5_000):
-        acceleration, wall_mass, free_mass, _, force = row
+        acceleration, wall_mass, free_mass, positive, negative, force = row
         if max(abs(wall_mass), abs(free_mass)) > d.most:
             continue
-        words = dict(zip(NAMES[1:4], row[1:4], strict=True))
-        exact = d.float_params(wall_mass * unit_kg, free_mass * unit_kg, words)
-        given = virtual_mass.weighed(exact, acceleration * d.acceleration.lsb, float(force))
-        assert abs(virtual_mass.weighed(d.params(words), acceleration, force) - given) <= 1 + 1e-9 * d.force.max
+        exact = d.float_params(wall_mass * unit_kg, free_mass * unit_kg)
+        given = virtual_mass.weighed(exact, acceleration * d.acceleration.lsb, float(force), positive, negative)
+        assert abs(model(d, [row])[0] - given) <= 1 + 1e-9 * d.force.max
         compared += 1
     assert compared > 5_000
 
@@ -163,6 +163,22 @@ def test_no_mass_is_no_change(estimator):
     wanted, found = (Axis(each, wall_stiffness=5e3, wall_damping=9.0).run(counts) for each in (axis, borne))
     assert np.array_equal(wanted.drive, found.drive)
     assert (wanted.drive != 0).any()
+
+
+@pytest.mark.parametrize("floating", [False, True])
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_wall_that_may_not_pull_does_not_pull_by_a_mass(side, floating):
+    """Also where its damper takes the spring's force to 0, and free space would have another mass."""
+    axis = dataclasses.replace(spec("mhz", "kalman"), virtual_mass_max_kg=0.3)
+    seconds = np.arange(300_000) / axis.sample_hz
+    counts = side * np.round(2e-3 / axis.count_m * np.sin(2 * np.pi * 5 * seconds)).astype(int)
+    wall = {"wall_stiffness": 200.0, "wall_damping": 20.0, "wall_left": int(side < 0), "wall_forbid_pull": 1}
+    inside = side * counts > 0
+    for masses in ({"free_mass": 0.3}, {"free_mass": -0.3, "wall_mass": 0.3}, {"wall_mass": -0.3}):
+        record = Axis(axis, floating, **wall, **masses).run(counts)
+        assert (side * record.drive[inside] <= 0).all()
+        assert (record.drive[inside] != 0).any()
+        assert (record.force[inside] == 0).any()
 
 
 @pytest.mark.parametrize("floating", [False, True])
@@ -191,7 +207,7 @@ def test_a_word_beyond_the_bound_acts_as_the_bound():
         for sign in (1, -1):
             assert bounded.most - sign * bounded.words[0].from_si(sign * most_kg) in (0, 1)
     for sign in (1, -1):
-        rows = [(d.acceleration.max // 9, 0, sign * most, 0, 0) for most in (d.most, d.most + 1, d.mass.max)]
+        rows = [(d.acceleration.max // 9, 0, sign * most, 0, 0, 0) for most in (d.most, d.most + 1, d.mass.max)]
         assert len(set(model(d, rows))) == 1
 
 

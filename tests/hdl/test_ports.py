@@ -1,7 +1,13 @@
 """Tables of ports, as exact text; `test_export` holds the ports against the Verilog."""
 
+from dataclasses import replace
+
+import pytest
+
 from hardwall.hdl.axis.axis import Axis
 from hardwall.hdl.ports import port_table
+from hardwall.model.estimators.acceleration import Accelerated
+from hardwall.model.estimators.registry import ESTIMATORS
 from stimuli.specs import spec
 
 
@@ -16,3 +22,13 @@ def test_a_row_of_every_kind_is_exact():
         "| `stamp` | out | 26 | UQ(26, 0) | 2e-08 s | 0 to 1.34218 s |  | number of this clock |",
     ):
         assert line in lines
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_every_port_of_every_estimator_has_a_row(estimator):
+    axis = spec("mhz", estimator)
+    accelerated = issubclass(ESTIMATORS[estimator], Accelerated)
+    component = Axis(replace(axis, virtual_mass_max_kg=0.1) if accelerated else axis)
+    table = port_table(component)
+    assert all(f"| `{name}` |" in table for name in component.signature.members)
+    assert ("| `acceleration` | out |" in table) == ("| `free_mass` | in |" in table) == accelerated

@@ -89,7 +89,7 @@ class AxisTwin:
         acceleration = 0
         if isinstance(d.estimator, Accelerated):
             acceleration = acceleration_of(params.estimator, self.estimator)
-        borne = virtual_mass.weighed(params.mass, acceleration, force)
+        borne = virtual_mass.borne(params.mass, params.wall, params.estimator, self.estimator, decoder.count, force)
         count, fault, restart = decoder.count, quadrature.fault(decoder), self.restart
         driven: list[int] = []
 

@@ -58,7 +58,8 @@ def random_words(design: Design, random: np.random.Generator) -> dict[str, int]:
         words |= dict.fromkeys((word.name for word in design.estimator.words), 0)
     elif kind < 0.6:
         for word in design.estimator.words:
-            words[word.name] = int(random.integers(0, int(word.format.max * 2.0 ** -random.integers(0, 8)) + 1))
+            some = int(random.integers(0, int(word.format.max * 2.0 ** -random.integers(0, 8)) + 1))
+            words[word.name] = min(max(some, word.low), word.high)
     of_all_sizes = "wall_stiffness", "wall_damping", "passivity_damping", "output_force_limit", "output_slew_limit"
     for name, top in ((word.name, word.format.max) for word in design.words if word.name in of_all_sizes):
         words[name] = int(random.integers(0, int(top * 2.0 ** -random.integers(0, 16)) + 1))

@@ -7,6 +7,8 @@ from hardwall.hdl.axis.virtual_mass import VirtualMass
 from hardwall.hdl.wires import names_of, port
 from hardwall.model.axis.virtual_mass import Design
 
+WITH_THE_FORCE = "force", "may_be_positive", "may_be_negative"
+
 
 class Borne(wiring.Component):
     """A virtual mass with all of a sample's inputs at one `strobe`.
@@ -32,15 +34,15 @@ class Borne(wiring.Component):
         m.d.sync += [strobe.eq(self.strobe), waits.eq(Cat(strobe, waits))]
         m.d.comb += [mass.strobe.eq(strobe), mass.forced.eq(waits[-1])]
         m.d.comb += [self.given.eq(mass.given), self.valid.eq(mass.valid)]
-        for name in ("acceleration", "wall_forbid_pull", "force", *names_of(self.design.words)):
+        for name in ("acceleration", *WITH_THE_FORCE, *names_of(self.design.words)):
             value = port(self, name)
             kept = Signal.like(value, name=f"kept_{name}")
             with m.If(self.strobe):
                 m.d.sync += kept.eq(value)
             if name in names_of(self.design.words):
                 looks, kept = self.strobe | strobe, Mux(self.strobe, value, kept)
-            elif name == "force":
-                late = Signal.like(kept)
+            elif name in WITH_THE_FORCE:
+                late = Signal.like(kept, name=f"late_{name}")
                 with m.If(strobe):
                     m.d.sync += late.eq(kept)
                 looks, kept = waits[-1], late

@@ -80,13 +80,27 @@ def test_what_is_hit_is_the_wall_with_the_mass():
 
 def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     picture = tmp_path / "mass.png"
-    words = ["mass", "--estimators", "kalman", "--rates", "none", "--masses", "-0.9,0.1", "--starts", 2, "--workers", 1]
+    words = [
+        "mass",
+        "--estimators",
+        "kalman",
+        "--rates",
+        "none",
+        "--masses",
+        "-0.9,0.1",
+        "--walls",
+        "1e3:9,40e3:60",
+        "--starts",
+        2,
+        "--workers",
+        1,
+    ]
     code, out, _ = call(monkeypatch, capsys, *words, "--json", "--plot", picture)
     assert code == 0
     report = json.loads(out)
     check("mass", report)
     assert report["shares"] == [-0.9, 0.1]
-    assert [row["stable_starts"][1] for row in report["rows"]] == [2, 2, 2]
+    assert [row["stable_starts"][1] for row in report["rows"]] == [2, 2]
     assert report["rows"][-1]["stable_starts"][0] == 0
     assert picture.stat().st_size > 0
 
@@ -106,6 +120,12 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
             ["--set", "wall.damping_n_s_per_m=1"],
             "must be absent (this command sets it): see the scene's section zwidth",
         ),
+        (["--walls", "1e3"], "--walls must be pairs K:B of N/m and N s/m, not '1e3'"),
+        (["--walls", "1e3:x"], "--walls must be numbers of 0 to 1e+09 N/m and N s/m, not 'x'"),
+        (["--walls", "9e5:1"], "wall.stiffness_n_per_m must be 0, or "),
+        (["drive-2011"], "drive-2011: motor must be absent: the theory beside the hits is of a rigid handle"),
+        (["--set", "passivity.damping_n_s_per_m=1"], "passivity must be absent: the theory"),
+        (["--set", "amplifier.bandwidth_hz=500"], "amplifier.bandwidth_hz must be absent: the theory"),
         (["eight-axes"], "eight-axes: has several axes"),
     ],
 )

@@ -7,12 +7,13 @@ from functools import partial
 from amaranth.hdl import Mux, Signal, Value
 
 from hardwall.hdl.axis.wall import PART_BITS, Wall
+from hardwall.hdl.wires import port
 from stimuli.specs import spec
 
 from .bench import Bench
 from .bugs import Bug
 from .property import Property
-from .widths import Widths
+from .widths import FreeProducts, Widths
 
 
 def wall(axis: str) -> Wall:
@@ -56,6 +57,28 @@ def never_pulls(axis: str, bench: Bench) -> None:
         bench.promise(~waits | ~forbidden | ~allowed | (left != side))
     left, forbidden = (bench.past(word, block.latency) for word in (left, forbidden))
     bench.promise(~block.valid | ~forbidden | Mux(left, block.force >= 0, block.force <= 0))
+
+
+def signs_are_where_it_acts(axis: str, bench: Bench) -> None:
+    """Promise what a virtual mass is told with a force: the signs that it may have at its sample's count."""
+    estimator = "kalman"
+    design = replace(spec(axis, estimator), virtual_mass_max_kg=0.1, coupling=True).design.wall
+    block = bench.block(Wall(design), FreeProducts())
+    waits, inner = samples(bench, block), bench.inner
+    counted, left, forbidden = Signal.like(block.count), block.wall_left, block.wall_forbid_pull
+    with bench.m.If(block.lead):
+        bench.m.d.sync += counted.eq(block.count)
+    outward = block.wall_position - counted
+    exists = (block.wall_stiffness != 0) | (block.wall_damping != 0)
+    inside = Mux(left, outward > 0, outward < 0) | block.wall_two_sided
+    told = {"positive": inside & (left | ~forbidden), "negative": inside & ~(left & forbidden)}
+    for sign, allowed in told.items():
+        bench.promise(~block.valid | (port(block, f"may_be_{sign}") == bench.past(allowed & exists, 3)))
+        bench.promise(~waits | (inner[sign] == allowed))
+    # For the induction.
+    bench.promise(inner["counted"] == counted)
+    bench.promise(~(waits | inner["placed"]) | (inner["offset"] == outward))
+    bench.promise(~waits | (inner["exists"] == exists))
 
 
 def whole(bench: Bench, name: str) -> Value:
@@ -123,6 +146,14 @@ PROPERTIES = [
         )
         for name, coupling in (("", False), ("coupling ", True))
         for axis in ("paper", "mhz", "narrow", "wide")
+    ),
+    Property(
+        "a virtual mass is told the signs that the force may have",
+        "wall mhz",
+        partial(signs_are_where_it_acts, "mhz"),
+        depth=6,
+        quick=True,
+        bugs=(Bug(Wall._say_where_it_acts, "allowed & exists", "allowed"),),
     ),
     Property(
         "the force is in range",
