@@ -32,6 +32,7 @@ STAGES = {
 """The drive stages; a sample has two periods of the bridge."""
 FINE = {"controller.clock_hz": 4_000_000}
 """A clock that leaves the bridge steps as fine as a steady contact needs."""
+MASS = {"controller.estimator": "kalman", "virtual_mass.most_kg": 0.2}
 WALL_M = 1e-3
 """The wall, behind the count 0, which is where the board is powered up."""
 
@@ -123,6 +124,27 @@ def test_a_motor_that_is_swapped_runs_away_and_trips(board, swapped, state, caus
     host.live(0.9)
     assert host.read("state") == state
     assert names(host.read("latched")) == causes
+
+
+@pytest.mark.parametrize("mass_kg", [-0.15, 0.15])
+def test_a_mass_drives_in_free_space_and_trips_as_any_drive(mass_kg):
+    """A pushed handle without a wall: too fast in the end, after which nothing drives it."""
+    with VirtualBoard(load("seed-2011", SCENE | MASS)) as board:
+        host, limit_m_per_s = SerialHost(board), 0.2
+        host.bring_up(0.0, 0.0, WALL_M)
+        host.write_si("supervisor_velocity_limit", limit_m_per_s)
+        host.write_si("free_mass", mass_kg)
+        assert host.write("commit", 1)
+        host.live(0.6)
+        board.hand.held_m, board.hand.push_n = None, 0.5
+        host.live(0.03)
+        assert (host.read("state"), names(host.read("latched"))) == (ARMED, [])
+        # Below 0 it helps the push, above 0 it holds it back.
+        assert host.read("driven") * -mass_kg > 0
+        host.live(0.3)
+        assert board.handle.velocity_m_per_s > limit_m_per_s
+        assert (host.read("state"), names(host.read("latched"))) == (TRIPPED, ["velocity_limit"])
+        assert board.handle.force_n == 0
 
 
 def test_a_clock_that_stands_leaves_no_drive(board, host):
