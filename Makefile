@@ -101,7 +101,7 @@ bench: $(VENV)/.test | tools ## how fast the loop runs, beside cocotb
 
 synth: $(VENV)/.synth $(VENV)/.test | tools ## size and fmax on three devices, median of several place-and-route seeds
 	@for device in $(DEVICES); do $(HARDWALL) synth --device $$device --seeds 3; done
-	@$(RUN) pytest -q -n 0 tests/rtl/test_synthesis.py tests/rtl/test_bitstream.py
+	@HARDWALL_LOOPS=all $(RUN) pytest -q -n 0 tests/rtl/test_synthesis.py tests/rtl/test_bitstream.py
 
 boards: $(VENV)/.synth | tools ## bitstreams for three boards, with their wiring, in build/boards/ (some minutes)
 	@for board in $(BOARDS); do $(HARDWALL) board $$board -o build/boards/$$board; done

@@ -1,5 +1,6 @@
 """Settings of the whole suite: one seed, logged; the marker of tests that run in the simulator; the recordings."""
 
+import gc
 import inspect
 import os
 from pathlib import Path
@@ -9,6 +10,10 @@ import pytest
 ROOT = Path(__file__).absolute().parent.parent
 SEED = os.environ.setdefault("HARDWALL_SEED", "1")
 SAMPLES = os.environ.get("HARDWALL_SAMPLES", "the default number of")
+# The workers share the cores already: linear algebra that takes all of them for a small matrix waits for them.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# What is collected and compiled stays: by Python's thresholds, a sixth of the time goes through it again and again.
+gc.set_threshold(50_000, 20, 100)
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -36,6 +41,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: item.get_closest_marker("rtl") is None)
 
 
+def pytest_collection_finish() -> None:
+    """Leave all that was collected to itself: a search for garbage needs not go through it."""
+    gc.freeze()
+
+
 @pytest.fixture(scope="session")
 def recordings() -> Path:
     """Return the folder of recordings of real encoders, which are not part of the project; skip where it is absent."""
@@ -46,6 +56,6 @@ def recordings() -> Path:
 
 
 @pytest.fixture
-def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Send results to an empty folder; compiled files stay where they are."""
-    monkeypatch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path / "build")
+def fresh(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Send results to an empty folder, which is made for those that have one; compiled files stay where they are."""
+    monkeypatch.setattr("hardwall.sim.jobs.store.build_dir", lambda: request.getfixturevalue("tmp_path") / "build")

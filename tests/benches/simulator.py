@@ -16,7 +16,6 @@ import numpy as np
 from amaranth.lib import wiring
 
 from hardwall.model.runtime.build_folder import build_dir
-from hardwall.sim.rtl import cocotb_runner
 
 from .harness import SEQUENCER, Harness
 
@@ -57,6 +56,9 @@ def simulate(test_file: str, make: Callable[..., wiring.Component], **parameters
         RuntimeError: if a test fails or none runs; the message gives the fault, the seed, the waveform, and the
             command that runs the test again.
     """
+    # What builds is not loaded where it is built already: in the simulator, whose start would take a third longer.
+    from hardwall.sim.rtl import cocotb_runner  # noqa: PLC0415
+
     file, component = Path(test_file).absolute(), make(**parameters)
     name = type(component).__module__.rsplit(".", 1)[-1]
     job = cocotb_runner.Job(

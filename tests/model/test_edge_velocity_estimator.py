@@ -19,8 +19,11 @@ from hardwall.model.estimators.registry import ESTIMATORS
 from hardwall.testing import rng
 from stimuli.lengths import LONG
 
-SOME = sorted(ESTIMATORS) if LONG else ["edge-kalman", "levant", "mt", "period"]
-ACCELERATED = [name for name, kind in sorted(ESTIMATORS.items()) if issubclass(kind, Accelerated)]
+EVERY = [(name, backend) for name in sorted(ESTIMATORS) for backend in ("fixed", "float")]
+SOME = EVERY if LONG else [("edge-kalman", "float"), ("levant", "fixed"), ("mt", "fixed"), ("period", "float")]
+SOME_ACCELERATED = [("edge-kalman", "fixed"), ("levant-edge", "float"), ("kalman", "fixed")]
+if LONG:
+    SOME_ACCELERATED = [(name, backend) for name, backend in EVERY if issubclass(ESTIMATORS[name], Accelerated)]
 RATE, CLOCKS = 1000.0, 1 << 17
 CLOCK_HZ = 100e6
 """Of a sample of 2**17 clocks, the next power of two."""
@@ -66,8 +69,7 @@ def by_the_axis(taken: EdgeVelocityEstimator, clocks: np.ndarray, counts: np.nda
 
 
 @pytest.mark.filterwarnings("ignore:raised flags")
-@pytest.mark.parametrize("backend", ["fixed", "float"])
-@pytest.mark.parametrize("estimator", SOME)
+@pytest.mark.parametrize(("estimator", "backend"), SOME)
 def test_pieces_are_the_whole(estimator, backend):
     clocks, counts = walk()
     times = clocks / (RATE * CLOCKS)
@@ -293,12 +295,11 @@ def test_a_long_standstill_before_the_first_piece_costs_no_warning():
         assert made([5], [7], 7).tolist() == [0.0] * 2000
 
 
-@pytest.mark.parametrize("floating", [False, True])
-@pytest.mark.parametrize("estimator", ACCELERATED if LONG else ["edge-kalman", "levant-edge", "kalman"])
-def test_the_acceleration_is_the_kernels_in_any_pieces(estimator, floating):
+@pytest.mark.parametrize(("estimator", "backend"), SOME_ACCELERATED)
+def test_the_acceleration_is_the_kernels_in_any_pieces(estimator, backend):
     clocks, counts = walk(400)
     times = clocks / (CLOCKS * RATE)
-    backend = "float" if floating else "fixed"
+    floating = backend == "float"
     taken = EdgeVelocityEstimator(RATE, estimator, MOTION, backend=backend, clock_hz=CLOCK_HZ)
     design, timing = taken.spec.design.estimator, taken.spec.design.timing
     edges = stamped.Edges(timing.strobe - LATENCY + clocks[1:], level(counts[1:] - counts[0]))

@@ -17,6 +17,7 @@ from hardwall.sim.rtl import bitstream, flow
 from hardwall.sim.rtl.bitstream import Order, TimingError, build
 from hardwall.sim.rtl.tools import SynthesisError
 from hardwall.sim.scene.load import load
+from stimuli.lengths import long_form
 from support.reports import check
 from support.tools import ROUTED, stand_in
 
@@ -157,7 +158,12 @@ needs_tools = pytest.mark.skipif(
 @needs_tools
 @pytest.mark.parametrize(
     ("name", "clock_hz"),
-    [("ulx3s-12f", 25_000_000), ("ulx3s-85f", 50_000_000), ("icebreaker", 24_000_000), ("tangnano9k", 24_000_000)],
+    [
+        ("ulx3s-12f", 25_000_000),
+        pytest.param("ulx3s-85f", 50_000_000, marks=long_form),
+        ("icebreaker", 24_000_000),
+        ("tangnano9k", 24_000_000),
+    ],
 )
 def test_the_real_packers_write_what_was_placed(name, clock_hz, tmp_path, monkeypatch):
     """A small design stands for the board; what is packed is read back, and another placement is not taken for it."""

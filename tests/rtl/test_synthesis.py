@@ -18,6 +18,7 @@ from hardwall.sim.rtl.synthesis import synthesise
 from hardwall.sim.rtl.tools import SynthesisError
 from hardwall.sim.scene.load import load
 from hardwall.sim.studies import costs
+from stimuli.lengths import long_form
 from support.reports import check
 from support.tools import stand_in
 
@@ -236,8 +237,10 @@ needs_tools = pytest.mark.skipif(
 @needs_tools
 @pytest.mark.parametrize(
     ("device", "lut4", "bram"),
-    [("ice40-up5k", 5280, 8 + 2 + 1), ("gw1nr-9", 8640, 16 + 2 + 1 + 1)],
-    ids=["ice40", "gowin"],
+    [
+        pytest.param("ice40-up5k", 5280, 8 + 2 + 1, id="ice40"),
+        pytest.param("gw1nr-9", 8640, 16 + 2 + 1 + 1, id="gowin", marks=long_form),
+    ],
 )
 def test_a_small_axis_on_a_real_part(tmp_path, monkeypatch, device, lut4, bram):
     monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path))

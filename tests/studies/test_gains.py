@@ -23,7 +23,7 @@ BOUND = 12.0
 BRIEF = {
     "zwidth.stiffness_to_n_per_m": 6e3,
     "zwidth.damping_from_n_s_per_m": 10.0,
-    "zwidth.damping_to_n_s_per_m": 15.0,
+    "zwidth.damping_to_n_s_per_m": 12.5,
     "zwidth.damping_step_n_s_per_m": 2.5,
     "protocol.settle_s": 2.0,
     "protocol.measure_s": 0.5,
