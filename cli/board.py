@@ -15,6 +15,7 @@ from ..sim.rtl.bitstream import Order, build
 from ..sim.rtl.loader import load as load_into
 from ..sim.scene.load import load
 from ..sim.scene.schema import Scene
+from ..sim.scene.several import ABSENT
 from .errors import BadInput, one_line
 from .options import AxesOption, EstimatorOption
 from .scenes import SceneOfBoardArgument
@@ -84,14 +85,15 @@ def spec_on(scene: Scene, axes: int | None, board: Description | None) -> AxisSp
     """Return the axis of a scene, or several with its requirements, each with the pulses that a board gives it.
 
     Raises:
-        BadInput: if the scene has a drive stage of its own, which no axis of several has, or the board has no pins for
-            so many.
+        BadInput: if the scene has a part that no axis of several has, or the board has no pins for so many.
         FieldError: if the axes cannot be.
     """
     if axes is None:
         return scene.spec
-    if scene.drive is not None:
-        raise BadInput(f"--axes must be absent for a scene with a drive stage, not {axes}")
+    for section, why in ABSENT.items():
+        # A map is no part of the hardware.
+        if section != "zwidth" and getattr(scene, section) is not None:
+            raise BadInput(f"--axes must be absent for a scene with [{section}], not {axes}: {why}")
     try:
         if board:
             board.of_axes(axes)

@@ -16,6 +16,9 @@ from .rates import RATES
 from .scenes import SceneArgument, curves_of, rates_of, refuse, refuse_for_maps
 from .study import StudyOptions, study
 
+LEAST = 1e-3
+"""The least virtual mass beside 0, as a share of the handle's: a smaller one may be less than its word resolves."""
+
 
 @study("workers", "resume", "set_", "plot")
 def command(
@@ -51,6 +54,9 @@ def command(
     shares = list(mass.SHARES)
     if masses is not None:
         shares = sorted(numbers_of(masses, "--masses", -most, most, "of the handle's mass"))
+        small = next((share for share in shares if 0 < abs(share) < LEAST), None)
+        if small is not None:
+            raise BadInput(f"--masses must be 0, or {LEAST:g} to {most:g} of either sign, not {small:g}")
     settings = mass.settings_of(curves_of(wanted or ",".join(mass.METHODS)), rates_hz, _walls(walls))
     run = partial(options.results, f"{case.scene.name}, virtual masses", verdict, store=Store("zwidth", options.resume))
     results = run(mass.jobs(case, settings, shares, starts, backend))

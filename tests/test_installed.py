@@ -133,7 +133,7 @@ def test_the_extra_sim_hits_and_replays(place, tmp_path):
         # An older Typer has other words for this, and other names for some options.
         refused = environment.run("hardwall", "hit", "--stiffness", "x", **keeping)
         assert (refused.returncode, refused.stderr) == (2, "hardwall: error: --stiffness must be a number, not 'x'\n")
-        assert environment.run("python", "-c", page("docs/guide/start.md").text).returncode == 0
+        assert environment.run("python", "-c", page("docs/guide/start.md").text, **keeping).returncode == 0
         replay = "hardwall", "replay", "recording.csv", "--column", "counts", "--plot", "replay.png", "--json"
         assert report(environment.run(*replay, **keeping))["samples"] == 2000
         assert (environment.work / "replay.png").stat().st_size > 10_000

@@ -60,7 +60,13 @@ def test_several_axes_have_the_rates_of_the_scene(calls, monkeypatch, capsys):
         (("synth", "mhz", "--axes", "2", "--estimator", "kalman"),
          "the scene's estimator must be one of fdm, levant, window, not 'kalman'"),
         (("synth", "mhz", "--axes", "2", "--set", "drive={stage='pdm', newtons_per_volt=2.0, full_scale_v=24.0}"),
-         "--axes must be absent for a scene with a drive stage, not 2"),
+         "--axes must be absent for a scene with [drive], not 2: the pipeline of several axes has no drive stages"),
+        (("verilog", "mhz", "--axes", "2", "--estimator", "kalman", "--set", "virtual_mass.most_kg=0.05", "-o", "out"),
+         "--axes must be absent for a scene with [virtual_mass], not 2: "
+         "the pipeline of several axes has no acceleration"),
+        (("verilog", "mhz", "--axes", "2", "--set", "passivity.damping_n_s_per_m=5", "-o", "out"),
+         "--axes must be absent for a scene with [passivity], not 2: "
+         "the pipeline of several axes has no passivity controller"),
     ],
 )  # fmt: skip
 def test_axes_that_cannot_be_are_one_line(calls, monkeypatch, capsys, command, message):

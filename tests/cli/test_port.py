@@ -22,7 +22,7 @@ from hardwall.sim.scene.load import load
 from support.command_line import call
 from support.processes import HARDWALL, ended, started, wait_until
 from support.reports import check_text
-from support.virtual_boards import PACE, SCENE, VirtualBoard, running
+from support.virtual_boards import ACCELERATED, PACE, SCENE, VirtualBoard, running
 
 AT = "--pace", PACE
 """What every command is told of the board."""
@@ -37,8 +37,7 @@ def virtual() -> Iterator[VirtualBoard]:
 
 @pytest.fixture(scope="module")
 def accelerated() -> Iterator[VirtualBoard]:
-    """A board whose estimator has an acceleration."""
-    with running(SCENE | {"controller.estimator": "kalman"}, "--tcp", "0", "--speed", str(2 * PACE)) as board:
+    with running(ACCELERATED, "--tcp", "0", "--speed", str(2 * PACE)) as board:
         yield board
 
 

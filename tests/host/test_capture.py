@@ -15,11 +15,9 @@ from hardwall.model.checks import FieldError
 from hardwall.sim.scene.load import load
 from host.twin_board import TwinBoard
 from stimuli.captures import records, window
-from support.virtual_boards import PACE, SCENE, VirtualBoard, running
+from support.virtual_boards import ACCELERATED, PACE, VirtualBoard, running
 
 PLACE = 100
-ACCELERATED = SCENE | {"controller.estimator": "levant-2"}
-"""The changes of a scene to an estimator with an acceleration."""
 
 
 @pytest.fixture(scope="module")
