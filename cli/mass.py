@@ -16,8 +16,8 @@ from .rates import RATES
 from .scenes import SceneArgument, curves_of, rates_of, refuse, refuse_for_maps
 from .study import StudyOptions, study
 
-LEAST = 1e-3
-"""The least virtual mass beside 0, as a share of the handle's: a smaller one may be less than its word resolves."""
+LEAST = 3.1e-5
+"""The least virtual mass beside 0, as a share of the handle's: half an LSB of a word of 16 bits, which holds 0.99."""
 
 
 @study("workers", "resume", "set_", "plot")
@@ -32,7 +32,7 @@ def command(
         str | None,
         typer.Option(
             metavar="SHARE,...",
-            help="virtual masses as shares of the handle's mass, -0.99 to 0.99",
+            help=f"virtual masses as shares of the handle's mass: 0, or {LEAST:g} to 0.99 of either sign",
             show_default=",".join(f"{share:g}" for share in mass.SHARES),
         ),
     ] = None,
@@ -56,7 +56,9 @@ def command(
         shares = sorted(numbers_of(masses, "--masses", -most, most, "of the handle's mass"))
         small = next((share for share in shares if 0 < abs(share) < LEAST), None)
         if small is not None:
-            raise BadInput(f"--masses must be 0, or {LEAST:g} to {most:g} of either sign, not {small:g}")
+            raise BadInput(
+                f"--masses must be 0, or {LEAST:g} to {most:g} of the handle's mass, of either sign, not {small}"
+            )
     settings = mass.settings_of(curves_of(wanted or ",".join(mass.METHODS)), rates_hz, _walls(walls))
     run = partial(options.results, f"{case.scene.name}, virtual masses", verdict, store=Store("zwidth", options.resume))
     results = run(mass.jobs(case, settings, shares, starts, backend))

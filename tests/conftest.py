@@ -13,7 +13,7 @@ SAMPLES = os.environ.get("HARDWALL_SAMPLES", "the default number of")
 # The workers share the cores already: linear algebra that takes all of them for a small matrix waits for them.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # What is collected and compiled stays: by Python's thresholds, a sixth of the time goes through it again and again.
-gc.set_threshold(50_000, 20, 100)
+gc.set_threshold(100_000, 100, 100)
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -42,7 +42,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Leave all that was collected to itself: a search for garbage needs not go through it."""
+    """Leave all that was collected to itself: a search for garbage need not go through it."""
     gc.freeze()
 
 

@@ -1,4 +1,7 @@
-"""How much the regressions do: `make test` the short forms, and `make soak`, by `HARDWALL_LOOPS=all`, the long ones."""
+"""How much the regressions do: `make test` the short forms, and `make soak`, by `HARDWALL_LOOPS=all`, the long ones.
+
+`make synth` does the long forms of what it tests, too: place and route is not installed everywhere.
+"""
 
 import os
 from collections.abc import Iterable
@@ -11,7 +14,9 @@ from hardwall.testing import SAMPLES
 Size = TypeVar("Size")
 LONG = os.environ.get("HARDWALL_LOOPS") == "all"
 """Whether the long forms are asked for."""
-long_form = pytest.mark.skipif(not LONG, reason="it takes minutes: make soak, or HARDWALL_LOOPS=all")
+long_form = pytest.mark.skipif(
+    not LONG, reason="it takes minutes: make soak, make synth where it is of place and route, or HARDWALL_LOOPS=all"
+)
 """Marks a test that only the long forms have."""
 REACHING = 100_000
 """The samples from which a campaign that takes a part of `SAMPLES` reaches every flag: it does not take less."""

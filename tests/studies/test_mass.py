@@ -112,7 +112,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     ("arguments", "message"),
     [
         (["--masses", "1"], "--masses must be numbers of -0.99 to 0.99 of the handle's mass, not '1'"),
-        (["--masses=-1e-9"], "--masses must be 0, or 0.001 to 0.99 of either sign, not -1e-09"),
+        (["--masses=-1e-9"], "--masses must be 0, or 3.1e-05 to 0.99 of the handle's mass, of either sign, not -1e-09"),
         (["--masses", ""], "--masses must be numbers of -0.99 to 0.99 of the handle's mass, not ''"),
         (["--rates", "10"], "--rates must be whole numbers of 1000 to 1e+07 Hz, not '10'"),
         (["--estimators", "fdm"], "virtual_mass.most_kg needs an estimator with an acceleration (kalman, "),

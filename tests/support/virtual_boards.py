@@ -10,7 +10,7 @@ from .processes import HARDWALL
 SCENE = {"controller.clock_hz": 1_000_000, "encoder.count_m": 10e-6, "protocol.start_m": -1e-3, "handle.coulomb_n": 0.0}
 """Changes of `seed-2011` to few clocks: a part of a core at real time. Without friction a contact has one position."""
 ACCELERATED = SCENE | {"controller.estimator": "levant-2"}
-"""A board whose estimator has an acceleration."""
+"""Changes to an estimator with an acceleration."""
 SMALL = {"controller.estimator": "fdm"}
 """Changes besides, for a netlist that is soon made."""
 PACE = 0.2
