@@ -1,5 +1,8 @@
 """The contract of an estimator with an acceleration: its format, its kernels, its port, and motions that are known."""
 
+from fractions import Fraction
+from math import floor
+
 import numpy as np
 import pytest
 from amaranth.hdl import Shape
@@ -65,6 +68,21 @@ def test_the_port_has_the_format_of_the_design(name, axis):
     assert isinstance(d.acceleration, SQ)
     assert d.acceleration.width <= WIDTH
     assert hardware.block_of(d).signature.members["acceleration"] == Out(Shape(d.acceleration.width, signed=True))
+
+
+@pytest.mark.parametrize("axis", AXES)
+@pytest.mark.parametrize("name", ["levant-edge", "edge-kalman", "count-kalman"])
+def test_the_steepest_line_has_a_word(name, axis):
+    """The slope of the line is held; over a sample it is exact, rounded down, and within its format at both ends."""
+    d = design(name, axis)
+    line = d.filter if name == "count-kalman" else d
+    params = line.params({word.name: word.reset for word in line.words})
+    steepest, units = params.acceleration_max, Fraction(line.clocks, 1 if name == "levant-edge" else 2**line.unit)
+    for slope in (-steepest, -1, 0, 1, steepest):
+        word = acceleration_of(params, line.start()._replace(acceleration=slope))
+        assert word == floor(Fraction(slope, 2**line.a.f) * units * 2**line.acceleration.f)
+        assert -line.acceleration.max - 1 <= word <= line.acceleration.max
+    assert line.acceleration == d.acceleration
 
 
 @each

@@ -93,6 +93,8 @@ OF_ZERO = ("octave", "down_0", "down_1", "down_2", "down_3")
 TIMES = ("time", "kept", "more", "few", "halves")
 # Both are what a weight between 0 and 1 makes of an error, which a free product does not know.
 WEIGHTED = ("mean", "place")
+# A slope over a sample: a free product is larger than any, and `test_acceleration` holds the steepest to its format.
+SLOPE = ("acceleration",)
 # What the parts of a quotient by multiplications may be follows from its products, one from another.
 PRODUCTS = ("dividend", "t", "x", "remainder", "made")
 # What the sum of a fit may be follows from its coefficients, one by one.
@@ -195,6 +197,7 @@ CASES = {
         partial(estimator, "kalman"),
         MOVED,
         Bug(kalman.Estimator.elaborate, "signed(len(operand) + len(gain))", "signed(len(operand) + len(gain) - 1)"),
+        ranges.kalman,
         axes=("mhz", "narrow"),
     ),
     "tracking-loop": Case(
@@ -239,20 +242,20 @@ CASES = {
     ),
     "levant-edge": Case(
         partial(estimator, "levant-edge"),
-        (*STAMPED, *TIMES),
+        (*STAMPED, *TIMES, *SLOPE),
         Bug(levant_edge.Estimator._measure, "s.size - d.mantissa, 0", "s.size, 0"),
         ranges.levant_edge,
     ),
     "edge-kalman": Case(
         partial(estimator, "edge-kalman"),
-        (*STAMPED, *WEIGHTED),
+        (*STAMPED, *WEIGHTED, *SLOPE),
         Bug(edge_kalman.Estimator._sample, "s.level + HALF", "s.level + 3 * HALF"),
         ranges.edge_kalman,
         promise="no arithmetic wraps but where it is meant to; the sums of what is weighted are not looked at",
     ),
     "count-kalman": Case(
         partial(estimator, "count-kalman"),
-        (*MOVED, "cell", "now", "at", *STAMPED, *WEIGHTED),
+        (*MOVED, "cell", "now", "at", *STAMPED, *WEIGHTED, *SLOPE),
         Bug(edge_kalman.Estimator._sample, "s.level + HALF", "s.level + 3 * HALF"),
         ranges.count_kalman,
         promise="no arithmetic wraps but where it is meant to; the sums of what is weighted are not looked at",

@@ -140,6 +140,15 @@ def levant_edge(bench: Bench, block: wiring.Component) -> None:
     bench.promise(~limiting | (inner["few"] == length - first) & (inner["halves"] == (length >> 1) - (first >> 1)))
 
 
+def kalman(bench: Bench, block: wiring.Component) -> None:
+    """Promise that the distance from the count is held until it is corrected."""
+    lead, most = bench.inner["lead"], block.design.lead.max
+    held = bench.state(
+        "INNOVATION", "VELOCITY", "ACCELERATION", "CORRECT VELOCITY", "LIMIT VELOCITY", "LIMIT ACCELERATION"
+    )
+    bench.promise(~held | (lead >= -most) & (lead <= most))
+
+
 def edge_kalman(bench: Bench, block: wiring.Component) -> None:
     filter_of_edges(bench, block.design)
 
