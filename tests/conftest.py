@@ -12,15 +12,17 @@ SEED = os.environ.setdefault("HARDWALL_SEED", "1")
 SAMPLES = os.environ.get("HARDWALL_SAMPLES", "the default number of")
 # The workers share the cores already: linear algebra that takes all of them for a small matrix waits for them.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-# What is collected and compiled stays: by Python's thresholds, a sixth of the time goes through it again and again.
-gc.set_threshold(100_000, 100, 100)
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_configure(config: pytest.Config) -> None:
-    """Give Hypothesis the suite's settings and its seed, unless the command line sets another."""
-    from hypothesis import settings  # noqa: PLC0415  (every simulator loads this file, and has no use for Hypothesis)
+    """Look for garbage as seldom as the program does; give Hypothesis its settings, and a seed unless it has one."""
+    # Every simulator loads this file, and has no use for either.
+    from hypothesis import settings  # noqa: PLC0415
 
+    from hardwall.cli.app import COLLECTED  # noqa: PLC0415
+
+    gc.set_threshold(*COLLECTED)
     # The first example of a kernel includes its compilation, and every failure must come again with the same seed.
     settings.register_profile("hardwall", deadline=None, database=None, print_blob=True)
     settings.load_profile("hardwall")

@@ -64,6 +64,9 @@ def test_several_axes_have_the_rates_of_the_scene(calls, monkeypatch, capsys):
         (("verilog", "mhz", "--axes", "2", "--estimator", "kalman", "--set", "virtual_mass.most_kg=0.05", "-o", "out"),
          "--axes must be absent for a scene with [virtual_mass], not 2: "
          "the pipeline of several axes has no acceleration"),
+        (("synth", "mhz", "--axes", "2", "--set", "coupling={stiffness_n_per_m=1e4, sample_hz=1000}"),
+         "--axes must be absent for a scene with [coupling], not 2: "
+         "the pipeline of several axes has no moving surfaces"),
         (("verilog", "mhz", "--axes", "2", "--set", "passivity.damping_n_s_per_m=5", "-o", "out"),
          "--axes must be absent for a scene with [passivity], not 2: "
          "the pipeline of several axes has no passivity controller"),

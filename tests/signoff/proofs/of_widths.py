@@ -102,6 +102,7 @@ FIT = ("age", "total")
 # In the search for the longest window, what the slopes and the sums may be follows from the history alone.
 SEARCH = ("age", "weight", "slope", "before", "below", "above", "total", "sums", "dividend")
 
+OF_A_FILTER = "no arithmetic wraps but where it is meant to; weighted sums and the acceleration are not looked at"
 PRODUCT = Bug(
     levant_semi_implicit.Estimator.elaborate, "len(self._word(0)) + len(factor)", "len(self._word(0)) + len(factor) - 1"
 )
@@ -245,20 +246,21 @@ CASES = {
         (*STAMPED, *TIMES, *SLOPE),
         Bug(levant_edge.Estimator._measure, "s.size - d.mantissa, 0", "s.size, 0"),
         ranges.levant_edge,
+        promise="no arithmetic wraps but where it is meant to; the acceleration is not looked at",
     ),
     "edge-kalman": Case(
         partial(estimator, "edge-kalman"),
         (*STAMPED, *WEIGHTED, *SLOPE),
         Bug(edge_kalman.Estimator._sample, "s.level + HALF", "s.level + 3 * HALF"),
         ranges.edge_kalman,
-        promise="no arithmetic wraps but where it is meant to; the sums of what is weighted are not looked at",
+        promise=OF_A_FILTER,
     ),
     "count-kalman": Case(
         partial(estimator, "count-kalman"),
         (*MOVED, "cell", "now", "at", *STAMPED, *WEIGHTED, *SLOPE),
         Bug(edge_kalman.Estimator._sample, "s.level + HALF", "s.level + 3 * HALF"),
         ranges.count_kalman,
-        promise="no arithmetic wraps but where it is meant to; the sums of what is weighted are not looked at",
+        promise=OF_A_FILTER,
     ),
     "scale_map": Case(
         lambda axis: ScaleMap(Bins(12, -300, 3, 64, 16.0)),
