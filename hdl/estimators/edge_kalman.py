@@ -4,16 +4,25 @@ from amaranth.hdl import Array, Cat, Const, Module, Mux, unsigned
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import Member
 
-from hardwall.model.estimators.edge_kalman import AGILE_LEVEL, BLEND_BITS, HALF, KX_BITS, TOP
+from hardwall.model.estimators.edge_kalman import BLEND_BITS, KX_BITS, LENGTH_SHIFT, RATE_SHIFT
 from hardwall.model.estimators.edge_kalman_design import (
+    AGILE_AT,
     ALARM_AT,
+    BETTER,
     BLEND,
-    FALL,
+    GAIN_FORMATS,
+    GROW,
     GUARD_BITS,
     KA,
     KV,
     KX,
-    LEVEL_BITS,
+    LEARN_BITS,
+    LIMIT_WIDTHS,
+    QUIET_AT,
+    SHARE_BITS,
+    USUAL,
+    USUAL_SHARE,
+    WORSE,
     Design,
 )
 
@@ -34,12 +43,13 @@ class Estimator(AcceleratedBlock):
         at an edge       r = n D - (v + a T/2) T - x
                          z <- z + blend (r - z)
                          the memory is agile if |z| is above its bound, and else grows with T
+                         the error of an edge is halved or doubled by the mean of |r|
                          x <- K_x r - r,  v <- v + a T + K_v r,  a <- a + K_a r
         at every sample  line = v + a s, held within the bound for no further edge
 
-    with the gains and bounds of the table's row for T and the memory. The velocity is the line. The acceleration is
-    a D, and 0 at rest. Start: at the first sample, and with `restart`, everything is forgotten; v = 0 until the second
-    edge.
+    with the bounds of a table's row for T and the error of an edge, and the gains of another's for T and the memory.
+    The velocity is the line. The acceleration is a D, and 0 at rest. Start: at the first sample, and with `restart`,
+    everything is forgotten; v = 0 until the second edge.
 
     With a map of the scale (`design.scale`) n is the difference of the places of the two edges: their numbers, each
     with the error that the map has for it.
@@ -99,6 +109,8 @@ class Estimator(AcceleratedBlock):
                     if name in HIGH:
                         m.d.comb += s.limb.eq(s.right[LIMB_BITS:])
                     self._decide(m, s, name)
+                    if self._design.halvings_max:
+                        self._learn(m, s, name)
                     m.next = following
         return m
 
@@ -113,14 +125,12 @@ class Estimator(AcceleratedBlock):
         m.d.sync += s.product.eq(s.left * s.limb)
 
     def _look_up(self, m, s):
-        """Add the table: a row's words are there two clocks after its number."""
+        """Add the tables: a row's words are there two clocks after its number."""
         d = self._design
-        lines = [
-            sum(word << start for word, start in zip(line, s.starts[:-1], strict=True)) for line in d.table.tolist()
-        ]
-        m.submodules.table = table = Memory(shape=unsigned(s.starts[-1]), depth=len(lines), init=lines)
-        read = table.read_port()
-        m.d.comb += [read.addr.eq(s.row), read.en.eq(1), Cat(*s.entry).eq(read.data)]
+        m.submodules.limits = _table(m, d.limits, LIMIT_WIDTHS, s.limits_row, s.limit)
+        m.submodules.gains = _table(m, d.gain_words, [fmt.width for fmt in GAIN_FORMATS], s.gains_row, s.gain)
+        shift = (s.length[1:] - d.shortest)[: len(s.length) - 1]
+        m.d.comb += [s.rate.eq((s.word << RATE_SHIFT) >> shift), s.nearer.eq(s.total >> KX_BITS)]
 
     def _displace(self, m, s):
         """Add the map: the error of this edge is there two clocks after its number, before it is used."""
@@ -169,11 +179,11 @@ class Estimator(AcceleratedBlock):
                 # The fastest that the axis is at the next edge, if the bound of the last sample was one.
                 s.fastest.eq(Mux(s.room < half, half, s.room)),
             ],
-            "TURN LOW": [s.size.eq(length_of(s.interval)), s.age.eq(s.now - Mux(s.anchor, s.at, s.stamp))],
+            "TURN LOW": [s.interval_size.eq(length_of(s.interval)), s.age.eq(s.now - Mux(s.anchor, s.at, s.stamp))],
             "TURN HIGH": [
                 s.waits(0),
                 *s.displaced,
-                s.row.eq(s.of_time | (s.level + HALF) >> LEVEL_BITS << d.row_bits),
+                s.limits_row.eq(Cat(s.time, s.halvings)),
                 # An age of half the range of the stamp is at rest, however long it is.
                 s.age_size.eq(length_of(s.age[:-1])),
             ],
@@ -185,16 +195,25 @@ class Estimator(AcceleratedBlock):
         p = s.params
         travelled = shift_floor(s.total, p.travel_shift)
         limited = saturate(s.far, -p.error_max, p.error_max)
-        fallen = s.level - s.entry[FALL]
+        quiet, agile = s.limit[QUIET_AT] << LENGTH_SHIFT, s.limit[AGILE_AT] << LENGTH_SHIFT
         return {
-            "TURN": [s.turned, s.behind.eq(s.way - s.place)],
-            "TRAVEL": [s.left.eq(s.v + (s.turn >> 1)), s.right.eq(s.interval), s.ahead.eq(s.v + s.turn)],
-            "TRAVEL LOW": [s.lower.eq(Mux(fallen < 0, 0, fallen))],
-            "TRAVEL HIGH": [s.waits(p.travel_shift)],
-            "TRAVEL SUM": [s.summed],
+            "TURN": [
+                s.turned,
+                s.behind.eq(s.way - s.place),
+                s.grown.eq(Mux(s.memory < agile, agile, Mux(s.memory > quiet, quiet, s.memory))),
+            ],
+            "TRAVEL": [
+                s.left.eq(s.v + (s.turn >> 1)),
+                s.right.eq(s.interval),
+                s.ahead.eq(s.v + s.turn),
+                s.gains_row.eq(s.row_of(s.nearest(s.grown))),
+            ],
+            "TRAVEL LOW": [],
+            "TRAVEL HIGH": [s.waits(p.travel_shift), s.grown.eq(s.grown + s.gain[GROW])],
+            "TRAVEL SUM": [s.summed, s.grown.eq(Mux(s.grown > quiet, quiet, s.grown))],
             "DISTANCE": [s.far.eq(s.behind - travelled)],
             "INNOVATION": [s.r.eq(limited), s.flags[0].eq(s.correct & (s.beyond | (limited != s.far)))],
-            "MEAN": [s.left.eq(s.r - s.mean), s.right.eq(s.entry[BLEND])],
+            "MEAN": [s.left.eq(s.r - s.mean), s.right.eq(s.limit[BLEND])],
             "MEAN LOW": [],
             "MEAN HIGH": [s.waits(0)],
             "MEAN SUM": [s.summed],
@@ -205,18 +224,30 @@ class Estimator(AcceleratedBlock):
         """Return the states that choose the memory, and correct the motion by its gains."""
         p = s.params
         magnitude = shift_floor(Mux(s.mean < 0, -s.mean, s.mean), p.alarm_shift)
-        faster = shift_floor(s.total, p.velocity_shift)
+        far_faster = shift_floor(s.total, p.velocity_shift)
+        faster = saturate(far_faster, ~p.turn_max, p.turn_max)
         return {
-            "ALARM": [s.alarm.eq(magnitude > s.entry[ALARM_AT])],
-            "LEVEL": [],
+            "ALARM": [s.alarm.eq(magnitude > s.limit[ALARM_AT])],
+            "MEMORY": [
+                s.length.eq(s.nearest(s.remembered)),
+                s.gains_row.eq(s.row_of(s.nearest(s.remembered))),
+            ],
             "READ": [],
-            "GAINS": [s.left.eq(s.r), s.right.eq(s.entry[KX])],
+            "GAINS": [s.left.eq(s.r), s.right.eq(s.gain[KX]), s.word.eq(s.gain[KV])],
             "PLACE LOW": [],
-            "PLACE HIGH": [s.waits(KX_BITS), s.right.eq(s.entry[KV])],
+            "PLACE HIGH": [s.waits(KX_BITS)],
             "PLACE SUM": [s.summed],
-            "VELOCITY HIGH": [s.waits(p.velocity_shift), s.right.eq(s.entry[KA])],
+            "VELOCITY": [
+                s.left.eq(s.nearer),
+                s.right.eq(s.rate),
+                s.word.eq(s.gain[KA]),
+            ],
+            "VELOCITY LOW": [],
+            "VELOCITY HIGH": [s.waits(p.velocity_shift)],
             "VELOCITY SUM": [s.summed],
-            "BEND HIGH": [s.waits(p.bend_shift), s.far_v.eq(s.ahead + faster)],
+            "FASTER": [s.left.eq(faster), s.right.eq(s.rate), s.far_faster.eq(faster != far_faster)],
+            "BEND LOW": [s.far_v.eq(s.ahead + s.left)],
+            "BEND HIGH": [s.waits(p.bend_shift)],
             "BEND SUM": [s.summed],
             "BEND": [s.bent.eq(s.a + shift_floor(s.total, p.bend_shift))],
             "UPDATE": [s.refuted.eq((s.was_still | ((s.v < 0) == s.was_down)) & (_size(s.v) > s.fastest))],
@@ -256,6 +287,7 @@ class Estimator(AcceleratedBlock):
             case "DIFFERENCE":
                 with m.If(s.fresh):
                     m.d.sync += [s.number.eq(s.to), s.stamp.eq(s.at), s.known.eq(0), *s.forgotten]
+                    m.d.sync += s.unlearned
             case "DECISION":
                 came, unknown = (s.interval != 0) | (s.passed != 0), ~s.known | s.interval[-1]
                 counted = fitted(s.passed, d.distance.width)
@@ -277,18 +309,16 @@ class Estimator(AcceleratedBlock):
             case "BLEND":
                 with m.If(s.correct):
                     m.d.sync += s.mean.eq(s.mean + (s.total >> BLEND_BITS))
-            case "LEVEL":
+            case "MEMORY":
                 with m.If(s.correct):
-                    m.d.sync += s.level.eq(Mux(s.alarm, TOP, s.lower))
-                with m.If(s.alarm):
-                    m.d.sync += s.row[d.row_bits :].eq(AGILE_LEVEL)
-            case "VELOCITY HIGH":
+                    m.d.sync += s.memory.eq(s.remembered)
+            case "VELOCITY":
                 with m.If(s.correct):
-                    m.d.sync += s.place.eq((s.total >> KX_BITS) - s.r)
-            case "BEND SUM":
+                    m.d.sync += s.place.eq(s.nearer - s.r)
+            case "BEND HIGH":
                 limited = saturate(s.far_v, -p.velocity_max, p.velocity_max)
                 with m.If(s.correct):
-                    m.d.sync += [s.v.eq(limited), s.flags[1].eq(limited != s.far_v)]
+                    m.d.sync += [s.v.eq(limited), s.flags[1].eq(s.far_faster | (limited != s.far_v))]
             case "UPDATE":
                 with m.If(s.correct):
                     m.d.sync += s.a.eq(saturate(s.bent, -p.acceleration_max, p.acceleration_max))
@@ -302,7 +332,32 @@ class Estimator(AcceleratedBlock):
                     m.d.sync += s.doubt.eq(p.doubt)
             case "OUTPUT":
                 with m.If(s.rest):
-                    m.d.sync += [s.level.eq(TOP), s.mean.eq(0), s.v.eq(0), s.a.eq(0), s.known.eq(s.known & ~s.gone)]
+                    m.d.sync += [s.memory.eq(0), s.mean.eq(0), s.v.eq(0), s.a.eq(0), s.known.eq(s.known & ~s.gone)]
+
+    def _learn(self, m, s, name):
+        """Add what a state learns of the error of an edge."""
+        p = s.params
+        match name:
+            case "MEAN":
+                m.d.sync += s.large.eq(shift_floor(_size(s.r), p.usual_shift) > s.limit[USUAL])
+            case "MEAN LOW":
+                with m.If(s.correct):
+                    m.d.sync += s.share.eq(s.share + (((s.large << SHARE_BITS) - s.share) >> LEARN_BITS))
+            case "MEAN HIGH":
+                with m.If((s.share > WORSE) & (s.halvings != 0)):
+                    m.d.sync += [s.share.eq(USUAL_SHARE), s.halvings.eq(s.halvings - 1)]
+                with m.If((s.share < BETTER) & (s.halvings != p.halvings_max)):
+                    m.d.sync += [s.share.eq(USUAL_SHARE), s.halvings.eq(s.halvings + 1)]
+
+
+def _table(m, rows, widths, row, words):
+    """Return a memory of a table's rows, whose columns at `row` are in `words` a clock later."""
+    starts = [sum(widths[:n]) for n in range(len(widths))]
+    lines = [sum(word << start for word, start in zip(line, starts, strict=True)) for line in rows.tolist()]
+    table = Memory(shape=unsigned(sum(widths)), depth=len(lines), init=lines)
+    read = table.read_port()
+    m.d.comb += [read.addr.eq(row), read.en.eq(1), Cat(*words).eq(read.data)]
+    return table
 
 
 def _size(value):

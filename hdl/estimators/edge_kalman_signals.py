@@ -1,10 +1,22 @@
 """The registers and wires of `edge_kalman`, by the names that the model uses."""
 
-from amaranth.hdl import Cat, Signal, signed, unsigned
+from amaranth.hdl import Cat, Const, Mux, Signal, signed, unsigned
 
 from hardwall.model.encoder.scale_map import FRACTION_BITS
-from hardwall.model.estimators.edge_kalman import TOP
-from hardwall.model.estimators.edge_kalman_design import Design
+from hardwall.model.estimators.edge_kalman import LENGTH_SHIFT, LONGEST
+from hardwall.model.estimators.edge_kalman_design import (
+    AGILE_AT,
+    GAIN_BITS,
+    GAIN_FORMATS,
+    GAIN_ROWS,
+    KV,
+    LENGTH,
+    LIMIT_WIDTHS,
+    MEMORY_BITS,
+    SHARE_BITS,
+    USUAL_SHARE,
+    Design,
+)
 
 from ..arithmetic.fixed import fitted, shape, shift_floor
 
@@ -23,11 +35,17 @@ class Signals:
         self.running, self.known = Signal(), Signal()
         self.number, self.stamp = Signal(count), Signal(time)
         self.bound, self.doubt = Signal(d.motion.width), Signal(range(d.doubt + 1))
-        self.level = Signal(range(TOP + 1))
+        self.memory = Signal(LENGTH.i + MEMORY_BITS)
         self.place, self.mean = Signal(error), Signal(error)
         self.v, self.a = Signal(motion), Signal(shape(d.a))
-        states = self.place, self.mean, self.v, self.a, self.doubt
-        self.forgotten = [self.level.eq(TOP), *(state.eq(0) for state in states)]
+        self.forgotten = [state.eq(0) for state in (self.memory, self.place, self.mean, self.v, self.a, self.doubt)]
+
+        # What is learned: how often the error of an edge is halved, by the share of larger innovations than usual.
+        self.halvings, self.unlearned = Const(0, 0), []
+        if p.halvings_max:
+            self.share, self.large = Signal(SHARE_BITS, init=USUAL_SHARE), Signal()
+            self.halvings = Signal(range(p.halvings_max + 1))
+            self.unlearned = [self.share.eq(USUAL_SHARE), self.halvings.eq(0)]
 
         # The sample. `correct`: its edge corrects; `anchor`: its edge is the new anchor.
         self.fresh, self.correct, self.anchor = Signal(), Signal(), Signal()
@@ -35,14 +53,14 @@ class Signals:
         self.interval, self.passed = Signal(time), Signal(count)
         self.distance, self.beyond = Signal(shape(d.distance)), Signal()
         self.age, self.rest, self.gone = Signal(time), Signal(), Signal()
-        self.size, self.age_size = Signal(range(d.time_bits + 1)), Signal(range(d.time_bits))
+        self.interval_size, self.age_size = Signal(range(d.time_bits + 1)), Signal(range(d.time_bits))
         self.flags = Signal(2)
         self.bursts, self.jolt = Signal(), Signal()
 
         self._place(d)
 
         # The multiplier: the low limb's product waits, with half of what is rounded off, for the high limb's.
-        wide = max(d.time_bits, *(fmt.width for fmt in d.columns))
+        wide = max(d.time_bits, GAIN_BITS, *LIMIT_WIDTHS[:1], *(fmt.width for fmt in GAIN_FORMATS))
         self.left = Signal(signed(max(d.motion.width + 1, d.a.width, d.error.width + 1)))
         self.right, self.limb = Signal(wide), Signal(max(LIMB_BITS, wide - LIMB_BITS))
         self.product = Signal(signed(len(self.left) + len(self.limb)))
@@ -50,13 +68,7 @@ class Signals:
         self.total = Signal(signed(max(len(self.low), len(self.product) + LIMB_BITS) + 1))
         self.summed = self.total.eq(self.low + (self.product << LIMB_BITS))
 
-        # The row of the table, and its words; `of_time` is the part of a row's number that the interval gives.
-        widths = [fmt.width for fmt in d.columns]
-        self.starts = [sum(widths[:n]) for n in range(len(widths) + 1)]
-        self.row = Signal(range(len(d.table)))
-        self.entry = [Signal(width, name=f"entry_{n}") for n, width in enumerate(widths)]
-        next_bit = self.interval.bit_select((self.size - 2)[: len(self.size)], 1)
-        self.of_time = Cat((self.size > 1) & next_bit, self.size)[: d.row_bits]
+        self._look_up(d)
 
         # The innovation, and what it changes.
         self.turn, self.ahead = Signal(signed(d.motion.width + 1)), Signal(signed(d.motion.width + 2))
@@ -64,9 +76,8 @@ class Signals:
         self.way = Signal(signed(max(len(self.exact) + d.clocks.bit_length() - self.place_shift, 1)))
         self.behind = Signal(signed(max(len(self.way), d.error.width) + 1))
         self.far = Signal(signed(max(len(self.behind), self._shifted(p.travel_shift)) + 1))
-        self.r = Signal(error)
-        self.lower, self.alarm = Signal.like(self.level), Signal()
-        self.far_v = Signal(signed(max(len(self.ahead), self._shifted(p.velocity_shift)) + 1))
+        self.r, self.nearer = Signal(error), Signal(error)
+        self.far_faster, self.far_v = Signal(), Signal(signed(d.motion.width + 3))
         self.bent = Signal(signed(max(d.a.width, self._shifted(p.bend_shift)) + 1))
 
         # The line, and the bound on it without a further edge.
@@ -75,6 +86,30 @@ class Signals:
         self.straight, self.line = Signal(signed(d.motion.width + 2)), Signal(motion)
         self.least, self.most = Signal(signed(d.motion.width + 1)), Signal(signed(d.motion.width + 1))
         self.held, self.far_line = Signal(motion), Signal()
+
+    def _look_up(self, d: Design) -> None:
+        """Add the rows of the tables and their words, the memory that an edge leaves, and the rate for it."""
+        self.limits_row = Signal(range(len(d.limits)))
+        self.limit = [Signal(width, name=f"limit_{n}") for n, width in enumerate(LIMIT_WIDTHS)]
+        self.gains_row = Signal(range(2 * GAIN_ROWS))
+        self.gain = [Signal(fmt.width, name=f"gain_{n}") for n, fmt in enumerate(GAIN_FORMATS)]
+        # The row of times for the interval: its length, and the bit after its first.
+        next_bit = self.interval.bit_select((self.interval_size - 2)[: len(self.interval_size)], 1)
+        self.time = Cat((self.interval_size > 1) & next_bit, self.interval_size)[: d.row_bits]
+
+        self.grown, self.alarm = Signal.like(self.memory), Signal()
+        self.remembered = Mux(self.alarm, self.limit[AGILE_AT] << LENGTH_SHIFT, self.grown)
+        self.length, self.word = Signal(LENGTH.i), Signal(GAIN_FORMATS[KV].width)
+        self.rate = Signal(GAIN_BITS)
+
+    @staticmethod
+    def nearest(memory):
+        """Return a memory to the nearest half octave."""
+        return memory[MEMORY_BITS:] + memory[MEMORY_BITS - 1]
+
+    def row_of(self, length):
+        """Return the row of `gains` for a memory in whole half octaves."""
+        return Cat(length[0], (length - self.time + LONGEST)[: len(self.gains_row) - 1])
 
     def _place(self, d: Design) -> None:
         """Add what passed, with the errors of both edges' places where a map has them: `before` is the anchor's."""

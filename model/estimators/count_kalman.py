@@ -26,7 +26,8 @@ counts in it. An axis that passes several edges in a sample is uniform within a 
     error**2 = edge_error**2 + min(1, tau / T)**2 / 12        counts**2
 
 and the memories and the bounds of the alarm follow from it as in `edge_kalman_design`. Slow edges are as good as with
-stamps. Where edges come every sample, this is a filter of counts.
+stamps. Where edges come every sample, this is a filter of counts. The filter learns no error here: the times of counts
+err in patterns, which only look smaller than what they do.
 
 Start, restart, saturation and wraps are as in the filter, whose flags are one here. A sample with `restart` has no
 edge. The watch over bursts finds none: without stamps, edges in bursts look like a motion.
@@ -65,9 +66,10 @@ class Filter(edge_kalman_design.Design):
         gains: as of `edge_kalman`.
     """
 
-    def _errors_counts(self, axis: AxisRequirements, gains: Gains, times_s: np.ndarray) -> np.ndarray:
-        passed = np.minimum(1 / (axis.sample_hz * times_s), 1.0)
-        return np.hypot(gains.edge_error_counts, passed / math.sqrt(12))
+    halvings_max = 0
+
+    def _stamp_errors_counts(self, axis: AxisRequirements, times_s: np.ndarray) -> np.ndarray:
+        return np.minimum(1 / (axis.sample_hz * times_s), 1.0) / math.sqrt(12)
 
 
 class Params(NamedTuple):

@@ -13,16 +13,25 @@ and at every sample, s clocks after the last edge, u = v + a s; this line is the
 edge alone: where edges come faster than samples, T is the time between edges in use.
 
 The gains are the steady-state Kalman filter's for a white jerk and for edges displaced at random. M is its memory: the
-time in which the past fades by e. For T far below M, K_x = 2 T / M, K_v = 2 T / M**2 and K_a = T / M**3. From T = 2 M
-on, the gains stay at their values for 2 M, about the gains of a fit to the last three edges. So the filter is a mean
-over many edges where they are dense, and a second difference of edges where they are rare. Gains come from a table, by
-the top two bits of T and by the level of the memory. They need no precision, only an error of the same sign everywhere.
+time in which the past fades by e. For T far below M, K_x = 2 T / M, K_v = 2 T / M**2 and K_a = T / M**3. At T = 2 M,
+the largest, they are about the gains of a fit to the last three edges. So the filter is a mean over many edges where
+they are dense, and a second difference of edges where they are rare. Gains come from a table, by T / M to half an
+octave. They need no precision, only an error of the same sign everywhere.
 
 The memory. Two bounds on the motion give a quiet and an agile memory: the jerk between impacts, and the acceleration at
 an impact (`edge_kalman_design` has the rule). The quiet memory is used until |z| passes a bound: ALARM standard
-deviations of the mean of that many innovations, for edges with the largest stated error. Then the memory becomes agile
-at once. It grows again by GROWTH, a quarter, of the time that passes. An impact is noticed after some tenths of a
-count, and the motion before it is forgotten within an agile memory. A single displaced edge raises no alarm.
+deviations of the mean of that many innovations. Then the memory becomes agile at once. It grows again by GROWTH, an
+eighth, of the time that passes. An impact is noticed after some tenths of a count, and the motion before it is
+forgotten within an agile memory. A single displaced edge raises no alarm.
+
+What is learned. Both memories and the bound follow from the error of an edge. The bound on it, which the axis states,
+is for the worst edge of the worst encoder. The filter begins with it, and counts the edges whose |r| is above the mean
+that this error makes usual. Of independent normal errors these are 0.42. The share of the last 2**LEARN_BITS edges or
+so is what tells. Below BETTER the errors are 0.56 of those in use or less, and the error in use is halved, up to
+HALVINGS times. Above WORSE they are twice as large or more, and it is doubled, up to what the axis states. Every edge
+counts for one, however large its innovation: a start, an impact or a single displaced edge teaches next to nothing. An
+encoder that is better than stated gets shorter memories and finer alarms. What was learned is kept over a rest, and
+forgotten with `restart`.
 
 Silence. Without an edge the axis is within its cell, which is as long as two edges may be apart, 1 + m counts. The line
 is held as in `levant_edge`: within -v and bound - v, where bound = (2 + 2 m) D 2**-l and 2**l <= s < 2**(l+1). A motion
@@ -51,7 +60,8 @@ is caught up in some agile memories.
 Saturation. v and u saturate at the velocity format (flag `velocity_saturated`); the distance and r saturate at the
 error's format (flag `error_saturated`). The place is then the last edge's, and the next edges recover a motion within
 the format. The acceleration saturates silently: as a limit it is part of the law, in float64 too. z is a mean of
-innovations and within their range.
+innovations and within their range. A correction of the velocity beyond twice the format's range is held there, and
+counts as a velocity that saturates.
 
 Limits. The count and the stamp may wrap: differences are modulo their widths. An interval of half the stamp's range or
 more only sets a new anchor.
@@ -61,6 +71,8 @@ Navigation (2001), section 11.2, for a memory that an alarm shortens. Its use on
 the time between them, is this project's.
 """
 
+import math
+
 from ..arithmetic.fixed import length_of, saturate, shift_floor, shift_round_half_up, wrap
 from ..encoder.quadrature import stamp_of
 from ..encoder.scale_map import FRACTION_BITS, place_of
@@ -68,15 +80,26 @@ from ..runtime.compiled import compiled
 from .acceleration import acceleration_of
 from .bursts import NOTHING, watch
 from .edge_kalman_design import (
+    AGILE_AT,
     ALARM_AT,
+    BETTER,
     BLEND,
-    FALL,
+    GAIN_BITS,
+    GAIN_FORMATS,
+    GROW,
+    INDEX_MAX,
     KA,
     KV,
     KX,
-    LEVEL_BITS,
-    LEVELS,
-    WIDTHS,
+    LEARN_BITS,
+    LENGTH,
+    LIMIT_WIDTHS,
+    MEMORY_BITS,
+    QUIET_AT,
+    SHARE_BITS,
+    USUAL,
+    USUAL_SHARE,
+    WORSE,
     Design,
     FloatParams,
     Gains,
@@ -88,10 +111,14 @@ from .levant_edge import refuted, within
 from .levant_edge_anchor import number_of
 
 __all__ = ["Design", "Gains"]
-AGILE_LEVEL = LEVELS - 1
-TOP = AGILE_LEVEL << LEVEL_BITS
-HALF = 1 << (LEVEL_BITS - 1)
-BLEND_BITS, KX_BITS = WIDTHS[BLEND], WIDTHS[KX]
+HALF = 1 << (MEMORY_BITS - 1)
+BLEND_BITS, KX_BITS = LIMIT_WIDTHS[BLEND], GAIN_FORMATS[KX].width
+LENGTH_SHIFT = MEMORY_BITS - LENGTH.f
+"""The bits by which a memory of the table is shifted to one of the state."""
+LONGEST = round(2 * math.log2(INDEX_MAX))
+"""The longest T in half octaves of M."""
+RATE_SHIFT = GAIN_BITS - GAIN_FORMATS[KV].width
+"""The bits by which a word of `kv` or `ka` is shifted to the rate of the shortest memory."""
 ANCHOR, FIRST, TIMED = range(3)
 """The kind of the last edge: the anchor itself, the first known edge, or an edge to correct by."""
 
@@ -103,10 +130,10 @@ def _time_of(params, stamp):
 
 
 @compiled
-def _started(params, seen, top, zero):
+def _started(params, seen, zero, share):
     """Return the state at a first sample: its last edge is the anchor, whose arrival was not seen."""
     at = _time_of(params, stamp_of(seen, seen.edge))
-    return State(1, 0, number_of(params, seen), at, zero, 0, top, zero, zero, zero, zero, NOTHING)
+    return State(1, 0, number_of(params, seen), at, zero, 0, zero, zero, zero, share, zero, zero, 0, NOTHING)
 
 
 @compiled
@@ -123,11 +150,23 @@ def _met(params, state, seen):
 
 
 @compiled
-def _row(params, interval, level):
-    """Return the row of the table for an interval at a whole level: the top two bits of the interval choose it."""
+def _half_octaves(interval):
+    """Return the row of times that an interval is in: its top two bits choose it."""
     length = length_of(interval)
     next_bit = interval >> max(length - 2, 0) & 1 if length > 1 else 0
-    return level << params.row_bits | length << 1 | next_bit
+    return length << 1 | next_bit
+
+
+@compiled
+def _nearest(memory):
+    """Return a memory to the nearest half octave."""
+    return (memory + HALF) >> MEMORY_BITS
+
+
+@compiled
+def _gains_row(memory, time):
+    """Return the row of `gains` for a memory and a row of times, both in whole half octaves."""
+    return (memory - time + LONGEST) << 1 | memory & 1
 
 
 @compiled
@@ -143,29 +182,60 @@ def _displaced(params, state, number):
 
 
 @compiled
-def _correct(params, state, interval, passed, number):
-    """Return (level, place, mean, velocity, acceleration, flags) at the new edge."""
-    row = _row(params, interval, (state.level + HALF) >> LEVEL_BITS)
-    turn = _turn(params, state.acceleration, interval)
+def _innovation(params, state, interval, passed, number, turn):
+    """Return (r, whether it or the edges passed were beyond their formats)."""
     travelled = shift_round_half_up((state.velocity + (turn >> 1)) * interval, params.travel_shift)
     distance = saturate(passed, -params.distance_max, params.distance_max)
     exact = (distance << FRACTION_BITS) + _displaced(params, state, number)
     far = shift_floor(exact * params.clocks, params.place_shift) - travelled - state.place
     r = saturate(far, -params.error_max, params.error_max)
+    return r, distance != passed or r != far
 
-    mean = state.mean + shift_floor(params.table[row, BLEND] * (r - state.mean), BLEND_BITS)
-    level = max(state.level - params.table[row, FALL], 0)
-    if shift_floor(abs(mean), params.alarm_shift) > params.table[row, ALARM_AT]:
-        level = TOP
-        row = _row(params, interval, AGILE_LEVEL)
 
-    place = shift_round_half_up(params.table[row, KX] * r, KX_BITS) - r
-    far_velocity = state.velocity + turn + shift_round_half_up(params.table[row, KV] * r, params.velocity_shift)
+@compiled
+def _remembered(params, state, r, time):
+    """Return (memory, mean, share, halvings) after an innovation."""
+    limits = params.limits[state.halvings << params.row_bits | time]
+    agile, quiet = limits[AGILE_AT] << LENGTH_SHIFT, limits[QUIET_AT] << LENGTH_SHIFT
+    before = min(max(state.memory, agile), quiet)
+    memory = min(before + params.gains[_gains_row(_nearest(before), time), GROW], quiet)
+    mean = state.mean + shift_floor(limits[BLEND] * (r - state.mean), BLEND_BITS)
+    if shift_floor(abs(mean), params.alarm_shift) > limits[ALARM_AT]:
+        memory = agile
+    large = int(shift_floor(abs(r), params.usual_shift) > limits[USUAL]) << SHARE_BITS
+    share, halvings = state.share + ((large - state.share) >> LEARN_BITS), state.halvings
+    if share > WORSE and halvings > 0:
+        share, halvings = USUAL_SHARE, halvings - 1
+    elif share < BETTER and halvings < params.halvings_max:
+        share, halvings = USUAL_SHARE, halvings + 1
+    return memory, mean, share, halvings
+
+
+@compiled
+def _rate(params, word, memory):
+    """Return a word of `kv` or `ka` as a rate for a memory in whole half octaves."""
+    return word << RATE_SHIFT >> ((memory >> 1) - params.shortest)
+
+
+@compiled
+def _correct(params, state, interval, passed, number):
+    """Return (memory, place, mean, share, velocity, acceleration, halvings, flags) at the new edge."""
+    time = _half_octaves(interval)
+    turn = _turn(params, state.acceleration, interval)
+    r, beyond = _innovation(params, state, interval, passed, number, turn)
+    memory, mean, share, halvings = _remembered(params, state, r, time)
+    length = _nearest(memory)
+    gains = params.gains[_gains_row(length, time)]
+
+    nearer = shift_round_half_up(gains[KX] * r, KX_BITS)
+    far_faster = shift_round_half_up(_rate(params, gains[KV], length) * nearer, params.velocity_shift)
+    faster = saturate(far_faster, ~params.turn_max, params.turn_max)
+    far_velocity = state.velocity + turn + faster
     velocity = saturate(far_velocity, -params.velocity_max, params.velocity_max)
-    bend = shift_round_half_up(params.table[row, KA] * r, params.bend_shift)
+    bend = shift_round_half_up(_rate(params, gains[KA], length) * faster, params.bend_shift)
     acceleration = saturate(state.acceleration + bend, -params.acceleration_max, params.acceleration_max)
-    flags = int(distance != passed or r != far) | int(velocity != far_velocity) << 1
-    return level, place, mean, velocity, acceleration, flags
+    flags = int(beyond) | int(velocity != far_velocity or faster != far_faster) << 1
+    return memory, nearer - r, mean, share, velocity, acceleration, halvings, flags
 
 
 @estimate.register(Params)
@@ -173,16 +243,18 @@ def _correct(params, state, interval, passed, number):
 def step(params, state, seen, restart):
     watched, clumped = watch(params.bursts, state.watch, seen, restart)
     if restart or not state.running:
-        state = _started(params, seen, TOP, 0)
+        state = _started(params, seen, 0, USUAL_SHARE)
     met, interval, passed = _met(params, state, seen)
     here = number_of(params, seen)
-    known, level, place, mean = state.known, state.level, state.place, state.mean
+    known, memory, place, mean = state.known, state.memory, state.place, state.mean
+    share, halvings = state.share, state.halvings
     velocity, acceleration, flags = state.velocity, state.acceleration, 0
     doubt = max(state.doubt - 1, 0)
     if met == FIRST:
-        known, doubt, level, place, mean, velocity, acceleration = 1, 0, TOP, 0, 0, 0, 0
+        known, doubt, memory, place, mean, velocity, acceleration = 1, 0, 0, 0, 0, 0, 0
     elif met == TIMED:
-        level, place, mean, velocity, acceleration, flags = _correct(params, state, interval, passed, here)
+        corrected = _correct(params, state, interval, passed, here)
+        memory, place, mean, share, velocity, acceleration, halvings, flags = corrected
         if refuted(state.bound, state.velocity, velocity):
             doubt = params.doubt
     if watched.jolt:
@@ -201,29 +273,50 @@ def step(params, state, seen, restart):
     if not doubt:
         line = within(line, velocity, bound)
     if rests:
-        level, mean, velocity, acceleration, line = TOP, 0, 0, 0, 0
+        memory, mean, velocity, acceleration, line = 0, 0, 0, 0, 0
         known = int(known and not gone)
-    after = State(1, known, number, stamp, bound, doubt, level, place, mean, velocity, acceleration, watched)
+    motion = memory, place, mean, share, velocity, acceleration
+    after = State(1, known, number, stamp, bound, doubt, *motion, halvings, watched)
     return after, shift_round_half_up(line, params.output_shift), flags | clumped << 2
 
 
 @compiled
+def _float_nearest(memory):
+    return int(memory + 0.5)
+
+
+@compiled
+def _float_remembered(params, state, r, time):
+    limits = params.limits[state.halvings << params.row_bits | time]
+    before = min(max(state.memory, limits[AGILE_AT]), limits[QUIET_AT])
+    memory = min(before + params.gains[_gains_row(_float_nearest(before), time), GROW], limits[QUIET_AT])
+    mean = state.mean + limits[BLEND] * (r - state.mean)
+    if abs(mean) > limits[ALARM_AT]:
+        memory = limits[AGILE_AT]
+    large = int(abs(r) > limits[USUAL]) << SHARE_BITS
+    share, halvings = state.share + (large - state.share) * 2.0**-LEARN_BITS, state.halvings
+    if share > WORSE and halvings > 0:
+        share, halvings = float(USUAL_SHARE), halvings - 1
+    elif share < BETTER and halvings < params.halvings_max:
+        share, halvings = float(USUAL_SHARE), halvings + 1
+    return memory, mean, share, halvings
+
+
+@compiled
 def _float_correct(params, state, interval, passed, number):
-    row = _row(params, interval, int(state.level + 0.5))
+    time = _half_octaves(interval)
     turn = state.acceleration * interval
     exact = passed + _displaced(params, state, number)
     r = exact * params.per_sample - (state.velocity + turn / 2) * interval - state.place
+    memory, mean, share, halvings = _float_remembered(params, state, r, time)
+    length = _float_nearest(memory)
+    gains = params.gains[_gains_row(length, time)]
 
-    mean = state.mean + params.table[row, BLEND] * (r - state.mean)
-    level = max(state.level - params.table[row, FALL], 0.0)
-    if abs(mean) > params.table[row, ALARM_AT]:
-        level = float(AGILE_LEVEL)
-        row = _row(params, interval, AGILE_LEVEL)
-
-    place = params.table[row, KX] * r - r
-    velocity = state.velocity + turn + params.table[row, KV] * r
-    acceleration = saturate(state.acceleration + params.table[row, KA] * r, -params.steepest, params.steepest)
-    return level, place, mean, velocity, acceleration
+    nearer = gains[KX] * r
+    faster = gains[KV] * 2.0 ** -(length >> 1) * nearer
+    bend = gains[KA] * 2.0 ** -(length >> 1) * faster
+    acceleration = saturate(state.acceleration + bend, -params.steepest, params.steepest)
+    return memory, nearer - r, mean, share, state.velocity + turn + faster, acceleration, halvings
 
 
 @estimate.register(FloatParams)
@@ -232,15 +325,17 @@ def float_step(params, state, seen, restart):
     """Take one sample in float64, unsaturated: the same algorithm, as a reference for the cost of fixed point."""
     watched, clumped = watch(params.bursts, state.watch, seen, restart)
     if restart or not state.running:
-        state = _started(params, seen, float(AGILE_LEVEL), 0.0)
+        state = _started(params, seen, 0.0, float(USUAL_SHARE))
     met, interval, passed = _met(params, state, seen)
     here = number_of(params, seen)
-    known, level, place, mean = state.known, state.level, state.place, state.mean
+    known, memory, place, mean = state.known, state.memory, state.place, state.mean
+    share, halvings = state.share, state.halvings
     velocity, acceleration, doubt = state.velocity, state.acceleration, max(state.doubt - 1, 0)
     if met == FIRST:
-        known, doubt, level, place, mean, velocity, acceleration = 1, 0, float(AGILE_LEVEL), 0.0, 0.0, 0.0, 0.0
+        known, doubt, memory, place, mean, velocity, acceleration = 1, 0, 0.0, 0.0, 0.0, 0.0, 0.0
     elif met == TIMED:
-        level, place, mean, velocity, acceleration = _float_correct(params, state, interval, passed, here)
+        corrected = _float_correct(params, state, interval, passed, here)
+        memory, place, mean, share, velocity, acceleration, halvings = corrected
         if refuted(state.bound, state.velocity, velocity):
             doubt = params.doubt
     if watched.jolt:
@@ -257,9 +352,10 @@ def float_step(params, state, seen, restart):
     if not doubt:
         line = within(line, velocity, bound)
     if rests:
-        level, mean, velocity, acceleration, line = float(AGILE_LEVEL), 0.0, 0.0, 0.0, 0.0
+        memory, mean, velocity, acceleration, line = 0.0, 0.0, 0.0, 0.0, 0.0
         known = int(known and not gone)
-    after = State(1, known, number, stamp, bound, doubt, level, place, mean, velocity, acceleration, watched)
+    motion = memory, place, mean, share, velocity, acceleration
+    after = State(1, known, number, stamp, bound, doubt, *motion, halvings, watched)
     return after, line, clumped << 2
 
 

@@ -10,21 +10,33 @@ acceleration. At each of the two memories, this change is a constant share of th
 
     J M_quiet**3 = QUIET s q sqrt(T / M_quiet)            C M_agile**2 = AGILE s q sqrt(T / M_agile)
 
-and M_agile is at most M_quiet. s combines the bound on an edge's error and, independent of it, the stamp's error at the
-largest speed. LEVELS memories are used, with equal ratios from one to the next. Their gains belong to the steady state
-at constant T (`riccati`), for a bandwidth of T / M a sample. QUIET, AGILE, ALARM and GROWTH were chosen by measurement,
-with the impact's C and the jerk of the paper's swing. They are the same for every axis.
+and M_agile is at most M_quiet. Neither is below T / 2. s combines the edge's own error and, independent of it, the
+stamp's error: 1 / sqrt(12) of the counts that pass in a unit at that T, and no more than at the largest speed. The
+shares, ALARM, GROWTH and what decides on the error were chosen by measurement, with the impact's C and the jerk of the
+paper's swing. They are the same for every axis.
 
-A row of the table is for a level and the top two bits of T. It is computed for the M and T in the middle of the row, at
-most a fifth off. K_v T and K_a T**2 are then too large by up to 1.22 and 1.5 at the row's longest T. The filter
-tolerates this for T up to 2.6 M, and diverges from 2.8 M on. For ever rarer edges the gains of a white jerk go to K_v T
-= 1.73 and K_a T**2 = 1.49. The last three edges give 1.5 and 1. So the gains are limited to those at T / M = INDEX_MAX,
-1.46 and 1.08. The columns are words of fixed formats, whose range follows from the largest entry:
+Two tables. T is known by its top two bits, that is to half an octave: a row stands for the times from 2 to 3, or from 3
+to 4, times a power of two. It is computed for the geometric middle, sqrt(3/2) / 2 * 2**(row / 2) units. A memory is
+counted in the same half octaves, with MEMORY_BITS fraction bits; the nearest whole one gives the gains.
 
-- `blend` UQ(0, 16): the share of r in the mean of r; `alarm`: the bound on this mean; `fall` UQ(2, 16): the growth of
-  the memory over T, in levels;
-- `kx` UQ(0, 18), `kv` of 20 bits and `ka` of 24: the gains. Each resolves its smallest entry, at the shortest T and the
-  longest memory, to a few bits: an error of an eighth in a gain has almost no effect.
+`limits`, by the number of halvings of the edge's error and the row of T:
+
+- `blend` UQ(0, 16): the share of r in the mean z. It is T's share of an agile memory.
+- `alarm`, 18 bits: the bound on |z|. In the steady state r has the variance s**2 / (1 - K_x), and is white.
+- `usual`, 18 bits: the mean of |r|, sqrt(2 / pi) s / sqrt(1 - K_x). Both take the K_x of the quiet memory.
+- `quiet` and `agile` UQ(6, 4): the memories.
+
+`gains`, by T / M to half an octave, and by the parity of the memory's half octaves:
+
+- `grow` UQ(1, 16): the growth of the memory over T, in half octaves.
+- `kx` UQ(0, 18). The gains belong to the steady state at constant T (`riccati`), for a bandwidth of T / M a sample.
+- `kv` and `ka` UQ(1, 11): K_v M / K_x and K_a M / K_v, which are almost constant. Each is shifted by the whole octaves
+  of M into a word of GAIN_BITS bits, a rate. So v is corrected by a share of the place's correction, and a by a share
+  of v's.
+
+K_v T and K_a T**2 are too large by up to 1.22 and 1.5 at a row's longest T. The filter tolerates this for T up to 2.6
+M, and diverges from 2.8 M on. For ever rarer edges the gains of a white jerk go to K_v T = 1.73 and K_a T**2 = 1.49.
+The last three edges give 1.5 and 1. With M at least T / INDEX_MAX they end at 1.46 and 1.08.
 
 Formats.
 
@@ -40,14 +52,14 @@ Formats.
   2**-C_BITS. D has no more bits here than a time.
 - The next edge is at most 1 + m counts from the last one, m = ROOM s and at least LEAST_ROOM: ROOM s are 3.5 standard
   deviations of the difference of two edges' errors. The silence of `edge_kalman` has (2 + 2 m) D as its `bound`.
-- int64 holds every product: with a time of 26 bits motion has at most 35 and acceleration too, with a gain of 24 bits
-  the error at most 38.
+- int64 holds every product: with a time of 26 bits motion has at most 35 and acceleration too, with a gain of
+  GAIN_BITS the error at most 38.
 """
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -68,20 +80,26 @@ AGILE = 28.0
 """The largest change of place by the acceleration within the agile memory, in errors of the place."""
 ALARM = 4.0
 """The mean of r that raises an alarm, in its own standard deviations."""
-GROWTH = 0.25
+GROWTH = 0.125
 """The growth of the memory per time, below 1: the memory never reaches back beyond the alarm."""
 INDEX_MAX = 2.0
 """The largest T / M of the gains: at this one the filter is stable, with some room, over all times of a row."""
+HALVINGS = 7
+"""The most halvings of an edge's error, where it is learned."""
+LEARN_BITS = 6
+"""An edge has 2**-LEARN_BITS of the share of the edges with an innovation larger than usual."""
+SHARE_BITS = 10
+"""Fraction bits of this share."""
+USUAL_SHARE, WORSE, BETTER = 448, 704, 160
+"""The share that a change begins with, and those above and below which the error is doubled and halved."""
 ROOM = 5.0
 """The excess over a count of the distance of two edges, in errors of an edge."""
 LEAST_ROOM = 0.25
 """The least such distance, counts: the line has errors of its own."""
 TOLERATED = 0.5
 """The silence between bursts that is tolerated, in memories of the shortest."""
-LEVELS = 4
-"""Memories: level 0 is the quiet one, the last is the agile one."""
-LEVEL_BITS = 16
-"""Fraction bits of a level."""
+MEMORY_BITS = 16
+"""Fraction bits of a memory, which is counted in half octaves."""
 SPEED_BITS = 14
 """The velocity resolves sqrt(C q), the speed that C gives within half a count, to 2**-SPEED_BITS."""
 GUARD_BITS = 6
@@ -94,11 +112,20 @@ TIME_BITS = 27
 """The most bits of a stamp that are used; a time in use has one less."""
 MOTION_MAX, ERROR_MAX = 35, 38
 """Largest widths of velocity and acceleration, and of the error, bits."""
-BLEND, ALARM_AT, FALL, KX, KV, KA = range(6)
-"""The columns of the table."""
-WIDTHS = 16, 18, 18, 18, 20, 24
+BLEND, ALARM_AT, USUAL, QUIET_AT, AGILE_AT = range(5)
+"""The columns of `limits`."""
+LIMIT_WIDTHS = 16, 18, 18, 10, 10
 """Bits of their words."""
-STEPS = 40
+LENGTH = UQ(6, 4)
+"""The format of a memory in the table."""
+GROW, KX, KV, KA = range(4)
+"""The columns of `gains`."""
+GAIN_FORMATS = UQ(1, 16), UQ(0, 18), UQ(1, 11), UQ(1, 11)
+GAIN_ROWS = 64
+"""The values of T / M: from INDEX_MAX down, by half octaves."""
+GAIN_BITS = 24
+"""Bits of a rate, which `kv` and `ka` are shifted to."""
+STEPS = 44
 """Clocks of the sequence: see `hardwall.hdl.estimators.edge_kalman`."""
 
 
@@ -119,7 +146,8 @@ class Gains(EstimatorGains):
 class Params(NamedTuple):
     """Widths, limits and shifts of the integer kernel; see `Design` for the formats.
 
-    `table` has the rows' words, and `scale` the errors of the edges' places: none, unless it is replaced.
+    `limits` and `gains` have the tables' words, and `scale` the errors of the edges' places: none, unless it is
+    replaced.
     """
 
     count_width: int
@@ -131,6 +159,9 @@ class Params(NamedTuple):
     travel_shift: int
     error_max: int
     alarm_shift: int
+    usual_shift: int
+    halvings_max: int
+    shortest: int
     velocity_shift: int
     bend_shift: int
     turn_shift: int
@@ -145,7 +176,8 @@ class Params(NamedTuple):
     doubt: int
     bursts: Limits
     row_bits: int
-    table: np.ndarray
+    limits: np.ndarray
+    gains: np.ndarray
     scale: scale_map.Params
 
 
@@ -159,17 +191,19 @@ class FloatParams(NamedTuple):
     bursts: Limits
     steepest: float
     row_bits: int
-    table: np.ndarray
+    halvings_max: int
+    limits: np.ndarray
+    gains: np.ndarray
     scale: scale_map.Params
 
 
 class State(NamedTuple):
     """The anchor (`known` if its arrival was seen), the motion there, and how long it is remembered.
 
-    `number` and `stamp` (in units) belong to the last edge. `length` is the length of the last interval, bits, and
-    `level` the level of the memory. `place` is the place of the axis beside the anchor, `mean` the mean of the
-    innovations (float: counts times units a sample). velocity and acceleration are words (float: counts a sample, and
-    counts a sample per unit).
+    `number` and `stamp` (in units) belong to the last edge. `memory` is in half octaves (a word; float: a number).
+    `place` is the place of the axis beside the anchor, `mean` the mean of the innovations (float: counts times units a
+    sample), and `share` that of the edges with one larger than usual, in 2**-SHARE_BITS. velocity and acceleration are
+    words (float: counts a sample, and counts a sample per unit). `halvings` is what was learned.
     """
 
     running: int
@@ -178,16 +212,18 @@ class State(NamedTuple):
     stamp: int
     bound: float
     doubt: int
-    level: float
+    memory: float
     place: float
     mean: float
+    share: float
     velocity: float
     acceleration: float
+    halvings: int
     watch: Watch
 
 
-START = State(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, bursts.NOTHING)
-FLOAT_START = State(0, 0, 0, 0, 0.0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, bursts.NOTHING)
+START = State(0, 0, 0, 0, 0, 0, 0, 0, 0, USUAL_SHARE, 0, 0, 0, bursts.NOTHING)
+FLOAT_START = State(0, 0, 0, 0, 0.0, 0, 0.0, 0.0, 0.0, float(USUAL_SHARE), 0.0, 0.0, 0, bursts.NOTHING)
 
 
 class Design(Accelerated):
@@ -199,15 +235,19 @@ class Design(Accelerated):
 
     Attributes:
         scale: the argument.
+        halvings_max: the most halvings of an edge's error; 0 if the filter is not to learn it.
         velocity, acceleration: formats of the outputs.
         motion, a, error: formats of v, of a, and of r and the place.
         distance: format of the number of edges passed in an interval.
         unit, time_bits: log2 of the clocks in a unit of time, and the bits of a stamp in units.
         per_sample, per_sample_f: the units in a sample as a word, and the fraction bits of the word.
-        row_bits: bits of the part of a row's number that a time gives.
-        columns: formats of the table's columns.
-        table: the words, shape (rows, columns); a row's number is its level, then what the time gives.
-        memories_s: the memory of every row, s, shape (levels, times).
+        row_bits: bits of the part that a time gives of the number of a row of `limits`.
+        columns: formats of the columns of `limits`.
+        limits: its words, shape (rows, columns); a row's number is the halvings, then what the time gives.
+        gain_words: those of `gains`, shape (rows, columns); a row's number is INDEX_MAX M / T in half
+            octaves, then the parity of M's half octaves.
+        shortest: the whole octaves of the shortest memory; a rate has GAIN_BITS - 1 + `shortest` fraction bits.
+        quiet_s, agile_s: the memories, s, shape (halvings, times).
 
     Raises:
         ValueError: if the rates or ranges fit no format that int64 can hold, with the accepted range.
@@ -218,6 +258,7 @@ class Design(Accelerated):
     inputs = Seen._fields
     flags = ("error_saturated", "velocity_saturated", "edges_in_bursts")
     latency = STEPS
+    halvings_max: ClassVar[int] = HALVINGS
 
     def __init__(self, axis: AxisRequirements, gains: Gains, scale: scale_map.Design | None = None):
         super().__init__(axis, gains)
@@ -232,14 +273,15 @@ class Design(Accelerated):
         self._per_sample = self.clocks * 2.0**-self.unit
         self._apart = 1 + max(ROOM * gains.edge_error_counts, LEAST_ROOM)
         self.doubt = doubt_samples(axis)
-        self._derive_table(axis, gains)
-        self.bursts = bursts.limits(axis, TOLERATED * float(self.memories_s.min()))
+        self._derive_limits(axis, gains)
+        self._derive_gains()
+        self.bursts = bursts.limits(axis, TOLERATED * float(self.agile_s[0].min()))
         self._derive_motion(axis)
         self._derive_words()
 
-    def _errors_counts(self, axis: AxisRequirements, gains: Gains, times_s: np.ndarray) -> np.ndarray:
-        """Return the RMS error of an edge by the interval before it, counts: its place, and its time at full speed."""
-        return np.full_like(times_s, math.hypot(gains.edge_error_counts, axis.edges_per_clock_max / math.sqrt(12)))
+    def _stamp_errors_counts(self, axis: AxisRequirements, times_s: np.ndarray) -> np.ndarray:
+        """Return the RMS error of an edge by the interval before it that its time makes, counts."""
+        return np.minimum(self._unit_s / times_s, axis.edges_per_clock_max) / math.sqrt(12)
 
     def _memories(
         self, axis: AxisRequirements, gains: Gains, times_s: np.ndarray, errors_counts: np.ndarray
@@ -248,31 +290,36 @@ class Design(Accelerated):
         error = errors_counts * axis.count_m * np.sqrt(times_s)
         quiet = (QUIET * error / gains.jerk_m_per_s3) ** (2 / 7)
         agile = (AGILE * error / gains.acceleration_m_per_s2) ** (2 / 5)
-        least, most = self._unit_s, self._unit_s * 2.0 ** (self.time_bits - 1)
-        quiet = np.clip(quiet, least, most)
+        least = np.maximum(self._unit_s, times_s / INDEX_MAX)
+        quiet = np.clip(quiet, least, self._unit_s * 2.0 ** (self.time_bits - 1))
         return quiet, np.clip(agile, least, quiet)
 
-    def _derive_table(self, axis: AxisRequirements, gains: Gains) -> None:
-        """Derive the gains and bounds of every row, in units of time and counts a sample."""
-        numbers = np.arange(1 << self.row_bits)
-        # A row is for the times from 2 to 3, or from 3 to 4, times a power of two; the middle is geometric.
-        units = 2.0 ** (numbers // 2 - 1) * np.where(numbers % 2, math.sqrt(3), math.sqrt(1.5))
-        times_s = units * self._unit_s
-        errors = self._errors_counts(axis, gains, times_s)
-        quiet, agile = self._memories(axis, gains, times_s, errors)
-        share = np.linspace(0, 1, LEVELS)[:, None]
-        self.memories_s = quiet ** (1 - share) * agile**share
-        index = times_s / self.memories_s
-        gain = np.array([steady_state(min(each, INDEX_MAX)) for each in index.ravel()]).reshape(*index.shape, 3)
-        blend = np.broadcast_to(-np.expm1(-times_s / agile), index.shape)
-        # In the steady state r has the variance s**2 / (1 - K_x), and is white.
-        free = np.maximum(1 - gain[..., 0], np.finfo(float).eps)
-        alarm = ALARM * errors * np.sqrt(blend / (2 - blend) / free) * self._per_sample
-        octaves = np.log2(quiet / agile) / (LEVELS - 1)
-        fall = np.minimum(GROWTH * index / math.log(2), (LEVELS - 1) * octaves) / np.where(octaves > 0, octaves, 1)
-        fall = np.where(octaves > 0, fall, LEVELS - 1)
-        columns = blend, alarm, fall, gain[..., 0], gain[..., 1] / units, gain[..., 2] / units**2
-        self.rates = np.stack([column.reshape(-1) for column in columns], 1)
+    def _derive_limits(self, axis: AxisRequirements, gains: Gains) -> None:
+        """Derive the memories and bounds by the error and the time; lengths are in half octaves."""
+        times_s = _middles(np.arange(1 << self.row_bits)) * self._unit_s
+        own = gains.edge_error_counts * 2.0 ** -np.arange(self.halvings_max + 1)[:, None]
+        errors = np.hypot(own, self._stamp_errors_counts(axis, times_s))
+        self.quiet_s, self.agile_s = self._memories(axis, gains, times_s, errors)
+        blend = -np.expm1(-times_s / self.agile_s)
+        kx = [steady_state(index)[0] for index in (times_s / self.quiet_s).ravel().tolist()]
+        free = np.maximum(1 - np.reshape(kx, errors.shape), np.finfo(float).eps)
+        usual = errors / np.sqrt(free) * self._per_sample
+        alarm = ALARM * usual * np.sqrt(blend / (2 - blend))
+        lengths = [2 * np.log2(memory / self._unit_s / _middles(0)) for memory in (self.quiet_s, self.agile_s)]
+        columns = blend, alarm, math.sqrt(2 / math.pi) * usual, *lengths
+        self.limit_rates = np.stack([column.ravel() for column in columns], 1)
+
+    def _derive_gains(self) -> None:
+        """Derive the gains by T / M: they need no axis."""
+        index = INDEX_MAX * 2.0 ** (-np.arange(GAIN_ROWS) / 2)
+        gain = np.array([steady_state(each) for each in index.tolist()])
+        grow = 2 * GROWTH / math.log(2) * index
+        rates = gain[:, 1:] / gain[:, :-1] / index[:, None]
+        # The words of M's parity: 1 / M is 2**(-parity / 2) / _middles(0), but for whole octaves.
+        parity = 2.0 ** (-np.arange(2) / 2) / _middles(0)
+        columns = [np.repeat(column, 2) for column in (grow, gain[:, 0])]
+        columns += [np.outer(column, parity).ravel() for column in rates.T]
+        self.gain_rates = np.stack(columns, 1)
 
     def _derive_motion(self, axis: AxisRequirements) -> None:
         """Derive the formats of the states and of the output."""
@@ -295,7 +342,7 @@ class Design(Accelerated):
         self.distance = SQ(min(1 + bits_for(reach), axis.count_width), 0)
 
         i = 1 + ACCELERATION_BITS + bits_for(bound * tau * self._unit_s / q)
-        longest = bits_for(self.memories_s.max() / self._unit_s)
+        longest = bits_for(self.quiet_s.max() / self._unit_s)
         self.a = SQ(i, max(min(self.velocity.f + 2 + longest, MOTION_MAX - i), 2 - i))
         cut = max(self.clocks.bit_length() - self.time_bits, 0)
         self.per_sample, self.per_sample_f = self.clocks >> cut, self.unit - cut
@@ -304,27 +351,31 @@ class Design(Accelerated):
 
     def _agile_samples(self, axis: AxisRequirements) -> float:
         """Return the agile memory for an edge a sample, in samples."""
-        row = min(2 * bits_for(max(self._per_sample, 1.0)), self.memories_s.shape[1] - 1)
-        return float(self.memories_s[-1, row]) * axis.sample_hz
+        row = min(2 * bits_for(max(self._per_sample, 1.0)), self.agile_s.shape[1] - 1)
+        return float(self.agile_s[0, row]) * axis.sample_hz
 
     def _derive_words(self) -> None:
-        """Derive the formats of the columns, and round the table to words."""
-        top, least = self.rates.max(axis=0), self.rates[:, ALARM_AT].min()
-        integer = [bits_for(float(largest)) for largest in top]
-        integer[BLEND] = integer[KX] = 0
-        integer[FALL] = WIDTHS[FALL] - LEVEL_BITS
-        # A bound that is beyond the range of the format is none; the least is resolved to an eighth.
-        integer[ALARM_AT] = min(integer[ALARM_AT], WIDTHS[ALARM_AT] - 3 + bits_for(float(least)))
-        self.columns = tuple(UQ(i, width - i) for i, width in zip(integer, WIDTHS, strict=True))
-        words = [
-            np.clip(np.floor(self.rates[:, n] * 2.0**fmt.f + 0.5), 0, fmt.max) for n, fmt in enumerate(self.columns)
-        ]
+        """Derive the formats of the columns, and round the tables to words."""
+        integer = [0]
+        for column in (ALARM_AT, USUAL):
+            top, least, width = (
+                self.limit_rates[:, column].max(),
+                self.limit_rates[:, column].min(),
+                LIMIT_WIDTHS[column],
+            )
+            # A bound that is beyond the range of the format is none; the least is resolved to an eighth.
+            integer.append(min(bits_for(float(top)), width - 3 + bits_for(float(least))))
+        integer += [LENGTH.i, LENGTH.i]
+        self.columns = tuple(UQ(i, width - i) for i, width in zip(integer, LIMIT_WIDTHS, strict=True))
+        self.limits = _words(self.limit_rates, self.columns)
+        self.gain_words = _words(self.gain_rates, GAIN_FORMATS)
         # A memory that grows at all comes to its end.
-        words[FALL] = np.maximum(words[FALL], 1)
-        self.table = np.stack(words, 1).astype(np.int64)
+        self.gain_words[:, GROW] = np.maximum(self.gain_words[:, GROW], 1)
+        half = 1 << (LENGTH.f - 1)
+        self.shortest = int((self.limits[:, AGILE_AT].min() + half >> LENGTH.f) // 2)
 
     def params(self, words: Mapping[str, int]) -> Params:
-        v, a, e = self.motion, self.a, self.error
+        v, a, e, rate_f = self.motion, self.a, self.error, GAIN_BITS - 1 + self.shortest
         return Params(
             count_width=self.count_width,
             unit=self.unit,
@@ -335,8 +386,11 @@ class Design(Accelerated):
             travel_shift=v.f - e.f,
             error_max=e.max,
             alarm_shift=e.f - self.columns[ALARM_AT].f,
-            velocity_shift=e.f + self.columns[KV].f - v.f,
-            bend_shift=e.f + self.columns[KA].f - a.f,
+            usual_shift=e.f - self.columns[USUAL].f,
+            halvings_max=self.halvings_max,
+            shortest=self.shortest,
+            velocity_shift=e.f + rate_f - v.f,
+            bend_shift=v.f + rate_f - a.f,
             turn_shift=a.f - v.f,
             turn_max=(1 << v.width) - 1,
             velocity_max=self.velocity.max << GUARD_BITS,
@@ -349,7 +403,8 @@ class Design(Accelerated):
             doubt=self.doubt,
             bursts=self.bursts,
             row_bits=self.row_bits,
-            table=self.table,
+            limits=self.limits,
+            gains=self.gain_words,
             scale=scale_map.nothing(),
         )
 
@@ -366,9 +421,22 @@ class Design(Accelerated):
             bursts=self.bursts,
             steepest=steepest,
             row_bits=self.row_bits,
-            table=self.rates,
+            halvings_max=self.halvings_max,
+            limits=self.limit_rates,
+            gains=self.gain_rates,
             scale=scale_map.nothing(True),
         )
 
     def start(self, floating: bool = False) -> State:
         return FLOAT_START if floating else START
+
+
+def _middles(rows: np.ndarray | int) -> np.ndarray:
+    """Return the geometric middle of the times of a row, units: from 2 to 3, or from 3 to 4, times a power of two."""
+    return math.sqrt(1.5) / 2 * 2.0 ** (np.asarray(rows) / 2)
+
+
+def _words(rates: np.ndarray, formats: tuple[UQ, ...]) -> np.ndarray:
+    """Return the words of a table's columns, rounded half up, and held within their formats."""
+    words = [np.clip(np.floor(rates[:, n] * 2.0**fmt.f + 0.5), 0, fmt.max) for n, fmt in enumerate(formats)]
+    return np.stack(words, 1).astype(np.int64)

@@ -5,7 +5,8 @@ from fractions import Fraction
 
 from hardwall.model.encoder.quadrature import Seen
 from hardwall.model.estimators.bursts import NOTHING, watch
-from hardwall.model.estimators.edge_kalman_design import LEVELS, Design
+from hardwall.model.estimators.count_kalman import Filter
+from hardwall.model.estimators.edge_kalman_design import GAIN_FORMATS, Design
 
 
 class Oracle:
@@ -13,7 +14,9 @@ class Oracle:
 
     def __init__(self, d: Design):
         self.d, self.known, self.bound = d, None, Fraction(0)
-        self.watched = NOTHING
+        self.watched, self.share, self.halvings = NOTHING, Fraction(7, 16), 0
+        # The times of counts err in patterns, so that filter learns nothing.
+        self.most = 0 if isinstance(d, Filter) else 7
 
     @staticmethod
     def to(value: Fraction, f: int, add: Fraction = Fraction(0)) -> Fraction:
@@ -31,19 +34,32 @@ class Oracle:
 
     def forget(self) -> None:
         self.x = self.z = self.v = self.a = Fraction(0)
-        self.level = Fraction(LEVELS - 1)
+        self.memory = Fraction(0)
 
     def turn(self, units: int) -> Fraction:
         d = self.d
         beyond = Fraction(2) ** d.motion.i
         return max(-beyond, min(beyond - Fraction(2) ** -d.motion.f, self.to(self.a * units, d.motion.f)))
 
-    def entries(self, units: int, level: int) -> list[Fraction]:
-        """Return the row's entries for a time in units: it has two rows an octave, from 2 and from 3 on."""
+    @staticmethod
+    def time(units: int) -> int:
+        """Return the row of a time in units: there are two an octave, from 2 and from 3 on."""
         length = units.bit_length()
-        within = 2 * length + int(length > 1 and units >= 3 << (length - 2))
-        row = self.d.table[level * (1 << self.d.row_bits) + within]
+        return 2 * length + int(length > 1 and units >= 3 << (length - 2))
+
+    def limits(self, time: int) -> list[Fraction]:
+        """Return blend, alarm, usual |r|, quiet and agile memory for the error that was learned."""
+        row = self.d.limits[self.halvings * (1 << self.d.row_bits) + time]
         return [int(word) * Fraction(2) ** -fmt.f for word, fmt in zip(row, self.d.columns, strict=True)]
+
+    def gains(self, memory: int, time: int) -> list[Fraction]:
+        """Return the memory's growth over the time and K_x, K_v / K_x, K_a / K_v, for whole half octaves."""
+        # The longest time is twice the memory, two half octaves more.
+        row = self.d.gain_words[2 * (memory - time + 2) + memory % 2]
+        words = [int(word) * Fraction(2) ** -fmt.f for word, fmt in zip(row, GAIN_FORMATS, strict=True)]
+        # Of a rate, 24 bits are kept, the first of which is a 1 before the point for the shortest memory.
+        kept = 23 + self.d.shortest
+        return words[:2] + [self.to(word / 2 ** (memory // 2), kept) for word in words[2:]]
 
     @property
     def fastest(self) -> Fraction:
@@ -59,6 +75,7 @@ class Oracle:
         at, now, number = (stamps[edge] >> d.unit) % wide, (now >> d.unit) % wide, count + down
         if self.known is None or restart:
             self.known, self.anchor, self.doubt = False, (number, at), 0
+            self.share, self.halvings = Fraction(7, 16), 0
             self.forget()
         # The watch over bursts is held to lists of edges in its own test.
         self.watched, found = watch(d.bursts, self.watched, Seen(*row[: len(Seen._fields)]), restart)
@@ -98,20 +115,37 @@ class Oracle:
         return self.half_up(line, d.velocity.f) * 2**d.velocity.f, math.floor(bent), flags
 
     def correct(self, passed: int, interval: int) -> int:
-        d, e = self.d, self.d.error
-        blend, alarm, fall, kx, *_ = self.entries(interval, math.floor(self.level + Fraction(1, 2)))
+        d, e, time = self.d, self.d.error, self.time(interval)
         turn = self.turn(interval)
         mean = self.to(self.v + turn / 2, d.motion.f)
         edges = max(-d.distance.max, min(d.distance.max, passed))
         far = self.to(Fraction(edges * d.clocks, 1 << d.unit), e.f) - self.half_up(mean * interval, e.f) - self.x
         r = self.held(far, e)
+        memory = self.remember(r, time)
+        _, kx, kv, ka = self.gains(memory, time)
+        nearer = self.half_up(kx * r, e.f)
+        self.x = nearer - r
+        far_faster = self.half_up(kv * nearer, d.motion.f)
+        # A correction has a bit more of range than a velocity.
+        most = Fraction(2) ** d.motion.i
+        faster = max(-most, min(most - Fraction(2) ** -d.motion.f, far_faster))
+        fast = self.v + turn + faster
+        self.v = self.limited(fast)
+        self.a = self.held(self.a + self.half_up(ka * faster, d.a.f), d.a)
+        return int(edges != passed or r != far) | 2 * (self.v != fast or faster != far_faster)
+
+    def remember(self, r: Fraction, time: int) -> int:
+        """Change the mean, the memory and what is learned by an innovation; return the memory in half octaves."""
+        d, e = self.d, self.d.error
+        blend, alarm, usual, quiet, agile = self.limits(time)
+        before = min(max(self.memory, agile), quiet)
+        grow, *_ = self.gains(math.floor(before + Fraction(1, 2)), time)
         self.z += self.to(blend * (r - self.z), e.f)
         alarmed = self.to(abs(self.z), d.columns[1].f) > alarm
-        level = math.floor(self.level + Fraction(1, 2))
-        self.level = Fraction(LEVELS - 1) if alarmed else max(self.level - fall, Fraction(0))
-        *_, kx, kv, ka = self.entries(interval, LEVELS - 1 if alarmed else level)
-        self.x = self.half_up(kx * r, e.f) - r
-        fast = self.v + turn + self.half_up(kv * r, d.motion.f)
-        self.v = self.limited(fast)
-        self.a = self.held(self.a + self.half_up(ka * r, d.a.f), d.a)
-        return int(edges != passed or r != far) | 2 * (self.v != fast)
+        self.memory = agile if alarmed else min(before + grow, quiet)
+        large = int(self.to(abs(r), d.columns[2].f) > usual)
+        self.share += self.to((large - self.share) / 64, 10)
+        change = int(self.share < Fraction(5, 32)) - int(self.share > Fraction(11, 16))
+        if change and 0 <= self.halvings + change <= self.most:
+            self.share, self.halvings = Fraction(7, 16), self.halvings + change
+        return math.floor(self.memory + Fraction(1, 2))

@@ -40,7 +40,7 @@ RATE_HZ = 1e6
 ACCELERATION = 2e6
 MOTION = Motion(acceleration_max=2 * ACCELERATION, speed_max=1e6, travel=1e6, jerk_max=1e9)
 """All in counts and seconds."""
-SHARES = {"kalman": 0.2, "levant-edge": 1.0, "edge-kalman": 0.01, "count-kalman": 0.5}
+SHARES = {"kalman": 0.2, "levant-edge": 1.0, "edge-kalman": 0.03, "count-kalman": 0.5}
 """How far an acceleration may be off, of the true one."""
 REST_S = 0.5
 """The standstill after the motion: longer than the slowest estimator takes to read it."""

@@ -11,8 +11,10 @@ from cocotb.triggers import ClockCycles, ReadOnly, RisingEdge
 from edge_oracle import Oracle
 
 from hardwall.hdl.estimators.edge_kalman import Estimator
+from hardwall.model.encoder.quadrature import Seen
 from hardwall.model.estimators import edge_kalman
 from hardwall.model.estimators.edge_kalman_design import START
+from hardwall.model.estimators.estimate import estimate
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
 from hardwall.testing.estimators import follow, model, names, outputs
 from stimuli.decoder_outputs import Scale
@@ -219,11 +221,12 @@ def test_a_constant_speed_is_read_to_a_few_words():
 
 
 def test_a_slow_speed_whose_edges_are_at_the_end_of_a_row_is_read():
-    """Edges much farther apart than the agile memory, where the gains of a white jerk would diverge."""
+    """Edges at twice the memory, the longest T, where the gains of a white jerk would diverge."""
     axis = replace(spec("mhz", "edge-kalman"), edge_error_max_counts=1e-3)
     d, every = axis.design.estimator, 3900
     assert 1.4 < every * d.clocks / 2 ** int(math.log2(every * d.clocks)) < 1.5
-    assert every * d.clocks / axis.clock_hz > 4 * d.memories_s[-1, 2 * (every * d.clocks).bit_length()]
+    row_s = 2.0 ** (int(math.log2(every * d.clocks)) + 1) * math.sqrt(1.5) / 2 / axis.clock_hz
+    assert d.agile_s[0, 2 * (every * d.clocks).bit_length()] == pytest.approx(row_s / 2)
     seen = walk(d, steady(d, 40 * every, every))
     assert all(velocity * d.velocity.lsb == pytest.approx(1 / every, rel=1e-3) for velocity, _ in seen[20 * every :])
 
@@ -239,18 +242,59 @@ def test_silence_between_edges_in_pairs_does_not_bound_the_velocity():
     assert seen.min() * d.velocity.lsb * every > 0.99
 
 
-def test_edges_that_err_are_averaged_over_the_memory():
+@pytest.mark.parametrize("halvings", [1, 2, 4])
+def test_edges_that_err_are_averaged_over_the_memory_of_the_error_that_is_learned(halvings):
     """At a constant speed and independent errors the velocity's deviation is that of the filter's own covariance."""
     d, axis, every = design("mhz"), spec("mhz", "edge-kalman"), 20
-    sigma = 0.05
+    # Well within the errors for which this number of halvings stays, which are 0.56 to 2 times the error in use.
+    sigma = 0.95 * 0.1 * 2.0**-halvings
     displaced = np.round(sigma * every * d.clocks * np.random.default_rng(5).standard_normal(400_000)).astype(int)
-    seen = walk(d, steady(d, 400_000, every, displaced=displaced))
-    velocity = np.array([v for v, _ in seen[40_000:]]) * d.velocity.lsb - 1 / every
+    rows = [(*row, 0) for row in steady(d, 400_000, every, displaced=displaced)]
+    assert states(d, rows[:40_000])[-1].halvings == halvings
+    velocity = model(d, rows, START)["velocity"][40_000:] * d.velocity.lsb - 1 / every
     time_s = every * d.clocks / axis.clock_hz
-    memory_s = d.memories_s[0, 2 * 10 + 0]
+    memory_s = d.quiet_s[halvings, 2 * 10 + 0]
     # The continuous filter's: sigma sqrt(3/2 T / M) / M; each edge errs independently of the motion.
     expected = sigma * math.sqrt(1.5 * time_s / memory_s) / memory_s / axis.sample_hz
     assert velocity.std() == pytest.approx(expected, rel=0.15)
+
+
+def states(d: edge_kalman.Design, rows) -> list:
+    """Return the state after each of the rows, which have a restart."""
+    after, params = [START], d.params({})
+    for *row, restart in rows:
+        after.append(estimate(params, after[-1], Seen(*row), restart)[0])
+    return after[1:]
+
+
+def test_what_is_learned_follows_the_edges_is_kept_over_a_rest_and_forgotten_with_a_restart():
+    d, every, scale = design("mhz"), 20, Scale(design("mhz"))
+    perfect = [(*row, 0) for row in steady(d, 20_000, every, scale)]
+    rest = [(*row, 0) for row in steady(d, 2_000, 10**9, scale)]
+    again = [(*row, 0) for row in steady(d, 400, every, scale)]
+    displaced = np.round(0.05 * every * d.clocks * np.random.default_rng(6).standard_normal(12_000)).astype(int)
+    worse = [(*row, 0) for row in steady(d, 12_000, every, scale, displaced)]
+    begun = [(*row, int(k == 0)) for k, row in enumerate(steady(d, 1, every, scale))]
+    parts = perfect, rest, again, worse, begun
+    seen = iter(states(d, [row for part in parts for row in part]))
+    perfect, rest, again, worse, begun = ([next(seen) for _ in part] for part in parts)
+    assert perfect[0].halvings == 0
+    assert perfect[-1].halvings == d.halvings_max
+    assert rest[-1].velocity == 0
+    assert {state.halvings for state in rest} == {d.halvings_max}
+    assert again[-1].halvings == d.halvings_max
+    # Four hundred edges later the error in use is that of the edges, half of what is stated, or a half more or less.
+    assert {state.halvings for state in worse[400 * every :]} <= {0, 1, 2}
+    assert (begun[0].halvings, begun[0].share) == (0, 448)
+
+
+def test_a_speed_that_jumps_is_hardly_an_error_of_edges():
+    """A speed that triples at once makes some tens of large innovations: one doubling, which is taken back."""
+    d, scale = design("mhz"), Scale(design("mhz"))
+    rows = [(*row, 0) for row in (*steady(d, 20_000, 20, scale), *steady(d, 8_000, 7, scale))]
+    learned = [state.halvings for state in states(d, rows)]
+    assert learned[19_999] == learned[-1] == d.halvings_max
+    assert min(learned[20_000:]) >= d.halvings_max - 1
 
 
 def test_an_impact_makes_the_memory_agile_and_it_grows_again():
@@ -261,8 +305,9 @@ def test_an_impact_makes_the_memory_agile_and_it_grows_again():
     before = list(steady(d, 100_000, 20, scale))
     after = list(steady(d, 20_000, 10, scale))
     seen = [velocity * d.velocity.lsb for velocity, _ in walk(d, [*before, *after])]
-    agile = d.memories_s[-1, 2 * 9 + 1] * axis.sample_hz
-    quiet = d.memories_s[0, 2 * 9 + 1] * axis.sample_hz
+    # These edges are perfect, and learned as such.
+    agile = d.agile_s[-1, 2 * 9 + 1] * axis.sample_hz
+    quiet = d.quiet_s[-1, 2 * 9 + 1] * axis.sample_hz
     assert quiet > 4 * agile
     reached = next(k for k, velocity in enumerate(seen[100_000:]) if abs(velocity - 0.1) < 0.01)
     assert reached < 2.5 * agile

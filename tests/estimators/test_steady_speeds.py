@@ -180,7 +180,7 @@ def bound(axis: Axis, words: dict[str, int], output: str, steady: Steady, sample
         return speed / clocks + lsb + (Fraction(2 * PLACES, samples) if d.name == "levant-edge" else 0)
     if d.name == "count-kalman":
         row = 2 * max(2, math.floor(2 / speed)).bit_length()
-        return lsb + Fraction(1 / (2 * d.filter.memories_s[-1, row] * axis.spec.sample_hz))
+        return lsb + Fraction(1 / (2 * d.filter.agile_s[0, row] * axis.spec.sample_hz))
     if d.name in HIGHER:
         own = (d.lipschitz * 2.0 ** words[d.words[0].name]) ** (1 / (d.order + 1))
         first, second = (LAMBDA[d.degree - 1][n] * PLACES ** (n / d.degree) * own for n in (d.order, d.order - 1))

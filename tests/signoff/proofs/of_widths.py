@@ -91,8 +91,10 @@ STAMPED = (*DIGITS, *BURSTS, "to", "passed", "waited", "interval", "measure")
 OF_ZERO = ("octave", "down_0", "down_1", "down_2", "down_3")
 # What a state that uses a time or a length finds is promised; else they may be cut too short.
 TIMES = ("time", "kept", "more", "few", "halves")
-# Both are what a weight between 0 and 1 makes of an error, which a free product does not know.
-WEIGHTED = ("mean", "place")
+# These are what a weight between 0 and 1 makes of an error, which a free product does not know.
+WEIGHTED = ("mean", "place", "nearer")
+# What a table's words make of a memory: words are free here, and `test_edge_kalman_design` has all of the tables'.
+TABLED = ("grown", "gains_row", "length", "rate")
 # A slope over a sample: a free product is larger than any, and `test_acceleration` holds the steepest to its format.
 SLOPE = ("acceleration",)
 # What the parts of a quotient by multiplications may be follows from its products, one from another.
@@ -102,7 +104,10 @@ FIT = ("age", "total")
 # In the search for the longest window, what the slopes and the sums may be follows from the history alone.
 SEARCH = ("age", "weight", "slope", "before", "below", "above", "total", "sums", "dividend")
 
-OF_A_FILTER = "no arithmetic wraps but where it is meant to; weighted sums and the acceleration are not looked at"
+OF_A_FILTER = (
+    "no arithmetic wraps but where it is meant to; "
+    "weighted sums, what tables make of a memory and the acceleration are not looked at"
+)
 PRODUCT = Bug(
     levant_semi_implicit.Estimator.elaborate, "len(self._word(0)) + len(factor)", "len(self._word(0)) + len(factor) - 1"
 )
@@ -250,15 +255,15 @@ CASES = {
     ),
     "edge-kalman": Case(
         partial(estimator, "edge-kalman"),
-        (*STAMPED, *WEIGHTED, *SLOPE),
-        Bug(edge_kalman.Estimator._sample, "s.level + HALF", "s.level + 3 * HALF"),
+        (*STAMPED, *WEIGHTED, *TABLED, *SLOPE),
+        Bug(edge_kalman.Estimator._sample, "length_of(s.age[:-1])", "length_of(s.age[:-1]) + 32"),
         ranges.edge_kalman,
         promise=OF_A_FILTER,
     ),
     "count-kalman": Case(
         partial(estimator, "count-kalman"),
-        (*MOVED, "cell", "now", "at", *STAMPED, *WEIGHTED, *SLOPE),
-        Bug(edge_kalman.Estimator._sample, "s.level + HALF", "s.level + 3 * HALF"),
+        (*MOVED, "cell", "now", "at", *STAMPED, *WEIGHTED, *TABLED, *SLOPE),
+        Bug(edge_kalman.Estimator._sample, "length_of(s.age[:-1])", "length_of(s.age[:-1]) + 32"),
         ranges.count_kalman,
         promise=OF_A_FILTER,
     ),

@@ -9,7 +9,6 @@ from hardwall.hdl.estimators import foaw, least_squares
 from hardwall.hdl.wires import port
 from hardwall.model.arithmetic.divisionless import digits
 from hardwall.model.encoder.quadrature import START
-from hardwall.model.estimators.edge_kalman import TOP
 from hardwall.model.estimators.edge_kalman_design import Design
 from hardwall.model.estimators.foaw import TAPS
 from hardwall.model.estimators.levant_adaptive import RAISED
@@ -159,7 +158,7 @@ def count_kalman(bench: Bench, block: wiring.Component) -> None:
 
 def filter_of_edges(bench: Bench, design: Design, path: str = "") -> None:
     """Promise the ranges of the states of a filter at a path inside the block."""
-    v_max, level = design.params({}).velocity_max, (0, TOP)
-    ranges = {"v": v_max, "line": v_max, "held": v_max, "bound": (0, 2 * v_max), "level": level, "lower": level}
+    v_max = design.params({}).velocity_max
+    ranges = {"v": v_max, "line": v_max, "held": v_max, "bound": (0, 2 * v_max)}
     ranges |= {"room": 2 * v_max, "least": (-2 * v_max, 0), "most": (0, 2 * v_max), "fastest": (0, 2 * v_max)}
     bench.within(**{path + name: bound for name, bound in ranges.items()})
