@@ -4,7 +4,7 @@ from amaranth.hdl import Array, Cat, Const, Module, Mux, unsigned
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import Member
 
-from hardwall.model.estimators.edge_kalman import BLEND_BITS, KX_BITS, LENGTH_SHIFT, RATE_SHIFT
+from hardwall.model.estimators.edge_kalman import BLEND_BITS, KX_BITS, LENGTH_SHIFT, LONGEST, RATE_SHIFT
 from hardwall.model.estimators.edge_kalman_design import (
     AGILE_AT,
     ALARM_AT,
@@ -129,6 +129,7 @@ class Estimator(AcceleratedBlock):
         d = self._design
         m.submodules.limits = _table(m, d.limits, LIMIT_WIDTHS, s.limits_row, s.limit)
         m.submodules.gains = _table(m, d.gain_words, [fmt.width for fmt in GAIN_FORMATS], s.gains_row, s.gain)
+        m.d.comb += s.gains_row.eq(Cat(s.length[0], (s.length - s.time + LONGEST)[: len(s.gains_row) - 1]))
         shift = (s.length[1:] - d.shortest)[: len(s.length) - 1]
         m.d.comb += [s.rate.eq((s.word << RATE_SHIFT) >> shift), s.nearer.eq(s.total >> KX_BITS)]
 
@@ -195,22 +196,20 @@ class Estimator(AcceleratedBlock):
         p = s.params
         travelled = shift_floor(s.total, p.travel_shift)
         limited = saturate(s.far, -p.error_max, p.error_max)
-        quiet, agile = s.limit[QUIET_AT] << LENGTH_SHIFT, s.limit[AGILE_AT] << LENGTH_SHIFT
+        # The low bits of a memory of the table are 0, so its words are compared with the top bits alone.
+        quiet, agile = s.limit[QUIET_AT], s.limit[AGILE_AT]
+        held = Mux(s.memory[LENGTH_SHIFT:] < agile, agile << LENGTH_SHIFT, s.memory)
         return {
-            "TURN": [
-                s.turned,
-                s.behind.eq(s.way - s.place),
-                s.grown.eq(Mux(s.memory < agile, agile, Mux(s.memory > quiet, quiet, s.memory))),
-            ],
+            "TURN": [s.turned, s.behind.eq(s.way - s.place), s.grown.eq(s.at_most(held, quiet))],
             "TRAVEL": [
                 s.left.eq(s.v + (s.turn >> 1)),
                 s.right.eq(s.interval),
                 s.ahead.eq(s.v + s.turn),
-                s.gains_row.eq(s.row_of(s.nearest(s.grown))),
+                s.length.eq(s.nearest(s.grown)),
             ],
             "TRAVEL LOW": [],
             "TRAVEL HIGH": [s.waits(p.travel_shift), s.grown.eq(s.grown + s.gain[GROW])],
-            "TRAVEL SUM": [s.summed, s.grown.eq(Mux(s.grown > quiet, quiet, s.grown))],
+            "TRAVEL SUM": [s.summed, s.grown.eq(s.at_most(s.grown, quiet))],
             "DISTANCE": [s.far.eq(s.behind - travelled)],
             "INNOVATION": [s.r.eq(limited), s.flags[0].eq(s.correct & (s.beyond | (limited != s.far)))],
             "MEAN": [s.left.eq(s.r - s.mean), s.right.eq(s.limit[BLEND])],
@@ -223,15 +222,12 @@ class Estimator(AcceleratedBlock):
     def _correction(self, s):
         """Return the states that choose the memory, and correct the motion by its gains."""
         p = s.params
-        magnitude = shift_floor(Mux(s.mean < 0, -s.mean, s.mean), p.alarm_shift)
+        magnitude = shift_floor(s.without_sign(s.mean), p.alarm_shift)
         far_faster = shift_floor(s.total, p.velocity_shift)
         faster = saturate(far_faster, ~p.turn_max, p.turn_max)
         return {
             "ALARM": [s.alarm.eq(magnitude > s.limit[ALARM_AT])],
-            "MEMORY": [
-                s.length.eq(s.nearest(s.remembered)),
-                s.gains_row.eq(s.row_of(s.nearest(s.remembered))),
-            ],
+            "MEMORY": [s.length.eq(s.nearest(s.remembered))],
             "READ": [],
             "GAINS": [s.left.eq(s.r), s.right.eq(s.gain[KX]), s.word.eq(s.gain[KV])],
             "PLACE LOW": [],
@@ -339,7 +335,7 @@ class Estimator(AcceleratedBlock):
         p = s.params
         match name:
             case "MEAN":
-                m.d.sync += s.large.eq(shift_floor(_size(s.r), p.usual_shift) > s.limit[USUAL])
+                m.d.sync += s.large.eq(shift_floor(s.without_sign(s.r), p.usual_shift) > s.limit[USUAL])
             case "MEAN LOW":
                 with m.If(s.correct):
                     m.d.sync += s.share.eq(s.share + (((s.large << SHARE_BITS) - s.share) >> LEARN_BITS))

@@ -3,7 +3,7 @@
 from amaranth.hdl import Cat, Const, Mux, Signal, signed, unsigned
 
 from hardwall.model.encoder.scale_map import FRACTION_BITS
-from hardwall.model.estimators.edge_kalman import LENGTH_SHIFT, LONGEST
+from hardwall.model.estimators.edge_kalman import LENGTH_SHIFT
 from hardwall.model.estimators.edge_kalman_design import (
     AGILE_AT,
     GAIN_BITS,
@@ -107,9 +107,15 @@ class Signals:
         """Return a memory to the nearest half octave."""
         return memory[MEMORY_BITS:] + memory[MEMORY_BITS - 1]
 
-    def row_of(self, length):
-        """Return the row of `gains` for a memory in whole half octaves."""
-        return Cat(length[0], (length - self.time + LONGEST)[: len(self.gains_row) - 1])
+    @staticmethod
+    def at_most(memory, word):
+        """Return a memory, or the table's if that is shorter."""
+        return Mux(memory[LENGTH_SHIFT:] >= word, word << LENGTH_SHIFT, memory)
+
+    @staticmethod
+    def without_sign(value):
+        """Return the magnitude of a signed value, less an LSB if it is negative."""
+        return (value[:-1] ^ value[-1].replicate(len(value) - 1)).as_unsigned()
 
     def _place(self, d: Design) -> None:
         """Add what passed, with the errors of both edges' places where a map has them: `before` is the anchor's."""

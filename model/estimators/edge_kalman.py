@@ -150,6 +150,12 @@ def _met(params, state, seen):
 
 
 @compiled
+def _size(value):
+    """Return the magnitude of a value, less an LSB if it is negative: what no carry is needed for."""
+    return value if value >= 0 else ~value
+
+
+@compiled
 def _half_octaves(interval):
     """Return the row of times that an interval is in: its top two bits choose it."""
     length = length_of(interval)
@@ -200,9 +206,9 @@ def _remembered(params, state, r, time):
     before = min(max(state.memory, agile), quiet)
     memory = min(before + params.gains[_gains_row(_nearest(before), time), GROW], quiet)
     mean = state.mean + shift_floor(limits[BLEND] * (r - state.mean), BLEND_BITS)
-    if shift_floor(abs(mean), params.alarm_shift) > limits[ALARM_AT]:
+    if shift_floor(_size(mean), params.alarm_shift) > limits[ALARM_AT]:
         memory = agile
-    large = int(shift_floor(abs(r), params.usual_shift) > limits[USUAL]) << SHARE_BITS
+    large = int(shift_floor(_size(r), params.usual_shift) > limits[USUAL]) << SHARE_BITS
     share, halvings = state.share + ((large - state.share) >> LEARN_BITS), state.halvings
     if share > WORSE and halvings > 0:
         share, halvings = USUAL_SHARE, halvings - 1

@@ -201,9 +201,9 @@ class State(NamedTuple):
     """The anchor (`known` if its arrival was seen), the motion there, and how long it is remembered.
 
     `number` and `stamp` (in units) belong to the last edge. `memory` is in half octaves (a word; float: a number).
-    `place` is the place of the axis beside the anchor, `mean` the mean of the innovations (float: counts times units a
-    sample), and `share` that of the edges with one larger than usual, in 2**-SHARE_BITS. velocity and acceleration are
-    words (float: counts a sample, and counts a sample per unit). `halvings` is what was learned.
+    `place` is the place of the axis beside the anchor, `mean` the mean of the innovations (float: both in counts times
+    units a sample). `share` counts edges whose innovation is larger than usual, in 2**-SHARE_BITS. velocity and
+    acceleration are words (float: counts a sample, and counts a sample per unit). `halvings` is what was learned.
     """
 
     running: int
@@ -244,7 +244,7 @@ class Design(Accelerated):
         row_bits: bits of the part that a time gives of the number of a row of `limits`.
         columns: formats of the columns of `limits`.
         limits: its words, shape (rows, columns); a row's number is the halvings, then what the time gives.
-        gain_words: those of `gains`, shape (rows, columns); a row's number is INDEX_MAX M / T in half
+        gain_words: the words of the gains, shape (rows, columns); a row's number is INDEX_MAX M / T in half
             octaves, then the parity of M's half octaves.
         shortest: the whole octaves of the shortest memory; a rate has GAIN_BITS - 1 + `shortest` fraction bits.
         quiet_s, agile_s: the memories, s, shape (halvings, times).

@@ -134,6 +134,10 @@ class Oracle:
         self.a = self.held(self.a + self.half_up(ka * faster, d.a.f), d.a)
         return int(edges != passed or r != far) | 2 * (self.v != fast or faster != far_faster)
 
+    def size(self, value: Fraction) -> Fraction:
+        """Return the magnitude of a word of the error, less an LSB if it is negative."""
+        return value if value >= 0 else -value - Fraction(2) ** -self.d.error.f
+
     def remember(self, r: Fraction, time: int) -> int:
         """Change the mean, the memory and what is learned by an innovation; return the memory in half octaves."""
         d, e = self.d, self.d.error
@@ -141,9 +145,9 @@ class Oracle:
         before = min(max(self.memory, agile), quiet)
         grow, *_ = self.gains(math.floor(before + Fraction(1, 2)), time)
         self.z += self.to(blend * (r - self.z), e.f)
-        alarmed = self.to(abs(self.z), d.columns[1].f) > alarm
+        alarmed = self.to(self.size(self.z), d.columns[1].f) > alarm
         self.memory = agile if alarmed else min(before + grow, quiet)
-        large = int(self.to(abs(r), d.columns[2].f) > usual)
+        large = int(self.to(self.size(r), d.columns[2].f) > usual)
         self.share += self.to((large - self.share) / 64, 10)
         change = int(self.share < Fraction(5, 32)) - int(self.share > Fraction(11, 16))
         if change and 0 <= self.halvings + change <= self.most:
