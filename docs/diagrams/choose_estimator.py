@@ -9,14 +9,12 @@ QUESTIONS = {
     "stamps": (Box(20, 98, 272, 46), "can the clock stamp edges?", ""),
     "bursts": (Box(20, 176, 272, 46), "edges in bursts?", ""),
     "cells": (Box(20, 258, 272, 54), "logic cells left?", "edges are stamped"),
-    "places": (Box(140, 378, 200, 56), "edges in their places?", ""),
     "counts": (Box(372, 258, 308, 54), "logic cells left?", "from counts alone"),
 }
 LEAVES = {
     "axes": (Box(430, 14, 250, 58), "levant", "output u1", ""),
-    "mt": (Box(20, 378, 100, 56), "mt", "few cells", ""),
-    "places": (Box(20, 492, 152, 78), "levant-edge", "best at an impact", ""),
-    "edges": (Box(188, 492, 152, 78), "edge-kalman", "tolerates", "misplaced edges"),
+    "mt": (Box(20, 378, 100, 78), "mt", "few cells", ""),
+    "edges": (Box(140, 378, 200, 78), "edge-kalman", "learns how well edges", "are in their places"),
     "fewest": (Box(372, 378, 84, 78), "window", "fewest cells", ""),
     "fewer": (Box(464, 378, 82, 78), "kalman", "fewer cells", ""),
     "counts": (Box(554, 378, 126, 78), "count-kalman", "short samples,", "no bursts"),
@@ -28,7 +26,7 @@ BUS = 332
 
 def draw() -> str:
     """Return the diagram."""
-    sheet = Sheet(592)
+    sheet = Sheet(478)
     for at, question, note in QUESTIONS.values():
         sheet.box(at, question, *((small(note),) if note else ()), tone=GREY)
     for at, name, *notes in LEAVES.values():
@@ -65,11 +63,9 @@ def _upper(sheet: Sheet) -> None:
 
 def _left(sheet: Sheet) -> None:
     """Draw the answers where edges are stamped."""
-    cells, places = QUESTIONS["cells"][0], QUESTIONS["places"][0]
+    cells = QUESTIONS["cells"][0]
     _down(sheet, "for mt only", 70, cells, LEAVES["mt"][0])
-    _down(sheet, "for edge-kalman", 190, cells, places)
-    _down(sheet, "yes", 158, places, LEAVES["places"][0])
-    _down(sheet, "no", 264, places, LEAVES["edges"][0])
+    _down(sheet, "for edge-kalman", 190, cells, LEAVES["edges"][0])
 
 
 def _right(sheet: Sheet) -> None:
