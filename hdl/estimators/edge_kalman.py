@@ -5,14 +5,14 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import Member
 
 from hardwall.model.estimators.edge_kalman import BLEND_BITS, KX_BITS, LENGTH_SHIFT, LONGEST, RATE_SHIFT
-from hardwall.model.estimators.edge_kalman_design import (
+from hardwall.model.estimators.edge_kalman_design import GUARD_BITS, Design
+from hardwall.model.estimators.edge_kalman_tables import (
     AGILE_AT,
     ALARM_AT,
     BETTER,
     BLEND,
     GAIN_FORMATS,
     GROW,
-    GUARD_BITS,
     KA,
     KV,
     KX,
@@ -23,7 +23,7 @@ from hardwall.model.estimators.edge_kalman_design import (
     USUAL,
     USUAL_SHARE,
     WORSE,
-    Design,
+    gain_words,
 )
 
 from ..arithmetic.fixed import fitted, length_of, saturate, shift_floor, shift_round_half_up
@@ -128,7 +128,7 @@ class Estimator(AcceleratedBlock):
         """Add the tables: a row's words are there two clocks after its number."""
         d = self._design
         m.submodules.limits = _table(m, d.limits, LIMIT_WIDTHS, s.limits_row, s.limit)
-        m.submodules.gains = _table(m, d.gain_words, [fmt.width for fmt in GAIN_FORMATS], s.gains_row, s.gain)
+        m.submodules.gains = _table(m, gain_words(), [fmt.width for fmt in GAIN_FORMATS], s.gains_row, s.gain)
         m.d.comb += s.gains_row.eq(Cat(s.length[0], (s.length - s.time + LONGEST)[: len(s.gains_row) - 1]))
         shift = (s.length[1:] - d.shortest)[: len(s.length) - 1]
         m.d.comb += [s.rate.eq((s.word << RATE_SHIFT) >> shift), s.nearer.eq(s.total >> KX_BITS)]

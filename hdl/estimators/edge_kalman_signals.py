@@ -4,7 +4,8 @@ from amaranth.hdl import Cat, Const, Mux, Signal, signed, unsigned
 
 from hardwall.model.encoder.scale_map import FRACTION_BITS
 from hardwall.model.estimators.edge_kalman import LENGTH_SHIFT
-from hardwall.model.estimators.edge_kalman_design import (
+from hardwall.model.estimators.edge_kalman_design import Design
+from hardwall.model.estimators.edge_kalman_tables import (
     AGILE_AT,
     GAIN_BITS,
     GAIN_FORMATS,
@@ -15,7 +16,6 @@ from hardwall.model.estimators.edge_kalman_design import (
     MEMORY_BITS,
     SHARE_BITS,
     USUAL_SHARE,
-    Design,
 )
 
 from ..arithmetic.fixed import fitted, shape, shift_floor

@@ -25,7 +25,7 @@ counts in it. An axis that passes several edges in a sample is uniform within a 
 
     error**2 = edge_error**2 + min(1, tau / T)**2 / 12        counts**2
 
-and the memories and the bounds of the alarm follow from it as in `edge_kalman_design`. Slow edges are as good as with
+and the memories and the bounds of the alarm follow from it as in `edge_kalman_tables`. Slow edges are as good as with
 stamps. Where edges come every sample, this is a filter of counts. The filter learns no error here: the times of counts
 err in patterns, which only look smaller than what they do.
 
@@ -37,7 +37,6 @@ Schneider, Mulligan, IEEE Transactions on Industrial Electronics 39 (1992), 11.
 """
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -68,8 +67,8 @@ class Filter(edge_kalman_design.Design):
 
     halvings_max = 0
 
-    def _stamp_errors_counts(self, axis: AxisRequirements, times_s: np.ndarray) -> np.ndarray:
-        return np.minimum(1 / (axis.sample_hz * times_s), 1.0) / math.sqrt(12)
+    def _passed_counts(self, axis: AxisRequirements, times_s: np.ndarray) -> np.ndarray:
+        return np.minimum(1 / (axis.sample_hz * times_s), 1.0)
 
 
 class Params(NamedTuple):

@@ -19,7 +19,7 @@ they are dense, and a second difference of edges where they are rare. Gains come
 octave. They need no precision, only an error of the same sign everywhere.
 
 The memory. Two bounds on the motion give a quiet and an agile memory: the jerk between impacts, and the acceleration at
-an impact (`edge_kalman_design` has the rule). The quiet memory is used until |z| passes a bound: ALARM standard
+an impact (`edge_kalman_tables` has the rule). The quiet memory is used until |z| passes a bound: ALARM standard
 deviations of the mean of that many innovations. Then the memory becomes agile at once. It grows again by GROWTH, an
 eighth, of the time that passes. An impact is noticed after some tenths of a count, and the motion before it is
 forgotten within an agile memory. A single displaced edge raises no alarm.
@@ -79,7 +79,8 @@ from ..encoder.scale_map import FRACTION_BITS, place_of
 from ..runtime.compiled import compiled
 from .acceleration import acceleration_of
 from .bursts import NOTHING, watch
-from .edge_kalman_design import (
+from .edge_kalman_design import Design, FloatParams, Gains, Params, State
+from .edge_kalman_tables import (
     AGILE_AT,
     ALARM_AT,
     BETTER,
@@ -100,11 +101,6 @@ from .edge_kalman_design import (
     USUAL,
     USUAL_SHARE,
     WORSE,
-    Design,
-    FloatParams,
-    Gains,
-    Params,
-    State,
 )
 from .estimate import estimate
 from .levant_edge import refuted, within

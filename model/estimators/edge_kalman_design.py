@@ -1,42 +1,10 @@
-"""Gains, formats, tables and state of `edge_kalman`, derived from the axis; `edge_kalman` defines the law.
+"""Gains, formats and state of `edge_kalman`, derived from the axis; `edge_kalman` defines the law.
 
 `edge_kalman` defines the symbols T, M, r, v, a and D. q is a count, s the error of an edge (counts), J and C are the
 bounds on jerk and acceleration. Times are in units of 2**`unit` clocks, 1 clock unless the stamp has more than
-TIME_BITS bits; D is then the units in a sample.
-
-The rule. A memory M averages over the M / T edges in it, so the place of the axis is known to about s sqrt(T / M).
-Within M the motion may change unforeseen: by J M**3 through its jerk, and at an impact by C M**2 through a jump of its
-acceleration. At each of the two memories, this change is a constant share of the place's error:
-
-    J M_quiet**3 = QUIET s q sqrt(T / M_quiet)            C M_agile**2 = AGILE s q sqrt(T / M_agile)
-
-and M_agile is at most M_quiet. Neither is below T / 2. s combines the edge's own error and, independent of it, the
-stamp's error: 1 / sqrt(12) of the counts that pass in a unit at that T, and no more than at the largest speed. The
-shares, ALARM, GROWTH and what decides on the error were chosen by measurement, with the impact's C and the jerk of the
-paper's swing. They are the same for every axis.
-
-Two tables. T is known by its top two bits, that is to half an octave: a row stands for the times from 2 to 3, or from 3
-to 4, times a power of two. It is computed for the geometric middle, sqrt(3/2) / 2 * 2**(row / 2) units. A memory is
-counted in the same half octaves, with MEMORY_BITS fraction bits; the nearest whole one gives the gains.
-
-`limits`, by the number of halvings of the edge's error and the row of T:
-
-- `blend` UQ(0, 16): the share of r in the mean z. It is T's share of an agile memory.
-- `alarm`, 18 bits: the bound on |z|. In the steady state r has the variance s**2 / (1 - K_x), and is white.
-- `usual`, 18 bits: the mean of |r|, sqrt(2 / pi) s / sqrt(1 - K_x). Both take the K_x of the quiet memory.
-- `quiet` and `agile` UQ(6, 4): the memories.
-
-`gains`, by T / M to half an octave, and by the parity of the memory's half octaves:
-
-- `grow` UQ(1, 16): the growth of the memory over T, in half octaves.
-- `kx` UQ(0, 18). The gains belong to the steady state at constant T (`riccati`), for a bandwidth of T / M a sample.
-- `kv` and `ka` UQ(1, 11): K_v M / K_x and K_a M / K_v, which are almost constant. Each is shifted by the whole octaves
-  of M into a word of GAIN_BITS bits, a rate. So v is corrected by a share of the place's correction, and a by a share
-  of v's.
-
-K_v T and K_a T**2 are too large by up to 1.22 and 1.5 at a row's longest T. The filter tolerates this for T up to 2.6
-M, and diverges from 2.8 M on. For ever rarer edges the gains of a white jerk go to K_v T = 1.73 and K_a T**2 = 1.49.
-The last three edges give 1.5 and 1. With M at least T / INDEX_MAX they end at 1.46 and 1.08.
+TIME_BITS bits; D is then the units in a sample. The memories, the bounds and the gains are tables: `edge_kalman_tables`
+has the rule. s combines the edge's own error and, independent of it, its stamp's: 1 / sqrt(12) of the counts that pass
+in a unit at that T, and no more than at the largest speed.
 
 Formats.
 
@@ -63,43 +31,24 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from ..arithmetic.fixed import SQ, UQ, bits_for
+from ..arithmetic.fixed import SQ, bits_for
 from ..checks import FieldError
 from ..encoder import scale_map
 from ..encoder.quadrature import Seen
 from ..requirements import AxisRequirements
 from . import bursts
+from . import edge_kalman_tables as tables
 from .acceleration import Accelerated
 from .bursts import Limits, Watch, doubt_samples
+from .edge_kalman_tables import HALVINGS, USUAL_SHARE
 from .estimate import EstimatorGains
-from .riccati import steady_state
 
-QUIET = 1.6
-"""The largest change of place by the jerk within the quiet memory, in errors of the place."""
-AGILE = 28.0
-"""The largest change of place by the acceleration within the agile memory, in errors of the place."""
-ALARM = 4.0
-"""The mean of r that raises an alarm, in its own standard deviations."""
-GROWTH = 0.125
-"""The growth of the memory per time, below 1: the memory never reaches back beyond the alarm."""
-INDEX_MAX = 2.0
-"""The largest T / M of the gains: at this one the filter is stable, with some room, over all times of a row."""
-HALVINGS = 7
-"""The most halvings of an edge's error, where it is learned."""
-LEARN_BITS = 6
-"""An edge has 2**-LEARN_BITS of the share of the edges with an innovation larger than usual."""
-SHARE_BITS = 10
-"""Fraction bits of this share."""
-USUAL_SHARE, WORSE, BETTER = 448, 704, 160
-"""The share that a change begins with, and those above and below which the error is doubled and halved."""
 ROOM = 5.0
 """The excess over a count of the distance of two edges, in errors of an edge."""
 LEAST_ROOM = 0.25
 """The least such distance, counts: the line has errors of its own."""
 TOLERATED = 0.5
 """The silence between bursts that is tolerated, in memories of the shortest."""
-MEMORY_BITS = 16
-"""Fraction bits of a memory, which is counted in half octaves."""
 SPEED_BITS = 14
 """The velocity resolves sqrt(C q), the speed that C gives within half a count, to 2**-SPEED_BITS."""
 GUARD_BITS = 6
@@ -112,19 +61,6 @@ TIME_BITS = 27
 """The most bits of a stamp that are used; a time in use has one less."""
 MOTION_MAX, ERROR_MAX = 35, 38
 """Largest widths of velocity and acceleration, and of the error, bits."""
-BLEND, ALARM_AT, USUAL, QUIET_AT, AGILE_AT = range(5)
-"""The columns of `limits`."""
-LIMIT_WIDTHS = 16, 18, 18, 10, 10
-"""Bits of their words."""
-LENGTH = UQ(6, 4)
-"""The format of a memory in the table."""
-GROW, KX, KV, KA = range(4)
-"""The columns of `gains`."""
-GAIN_FORMATS = UQ(1, 16), UQ(0, 18), UQ(1, 11), UQ(1, 11)
-GAIN_ROWS = 64
-"""The values of T / M: from INDEX_MAX down, by half octaves."""
-GAIN_BITS = 24
-"""Bits of a rate, which `kv` and `ka` are shifted to."""
 STEPS = 44
 """Clocks of the sequence: see `hardwall.hdl.estimators.edge_kalman`."""
 
@@ -244,8 +180,6 @@ class Design(Accelerated):
         row_bits: bits of the part that a time gives of the number of a row of `limits`.
         columns: formats of the columns of `limits`.
         limits: its words, shape (rows, columns); a row's number is the halvings, then what the time gives.
-        gain_words: the words of the gains, shape (rows, columns); a row's number is INDEX_MAX M / T in half
-            octaves, then the parity of M's half octaves.
         shortest: the whole octaves of the shortest memory; a rate has GAIN_BITS - 1 + `shortest` fraction bits.
         quiet_s, agile_s: the memories, s, shape (halvings, times).
 
@@ -273,53 +207,26 @@ class Design(Accelerated):
         self._per_sample = self.clocks * 2.0**-self.unit
         self._apart = 1 + max(ROOM * gains.edge_error_counts, LEAST_ROOM)
         self.doubt = doubt_samples(axis)
-        self._derive_limits(axis, gains)
-        self._derive_gains()
+        self._derive_tables(axis, gains)
         self.bursts = bursts.limits(axis, TOLERATED * float(self.agile_s[0].min()))
         self._derive_motion(axis)
-        self._derive_words()
 
-    def _stamp_errors_counts(self, axis: AxisRequirements, times_s: np.ndarray) -> np.ndarray:
-        """Return the RMS error of an edge by the interval before it that its time makes, counts."""
-        return np.minimum(self._unit_s / times_s, axis.edges_per_clock_max) / math.sqrt(12)
+    def _passed_counts(self, axis: AxisRequirements, times_s: np.ndarray) -> np.ndarray:
+        """Return the counts that pass in the time to which an edge's time is known, by the interval before it."""
+        return np.minimum(self._unit_s / times_s, axis.edges_per_clock_max)
 
-    def _memories(
-        self, axis: AxisRequirements, gains: Gains, times_s: np.ndarray, errors_counts: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the quiet and the agile memory for intervals, s."""
-        error = errors_counts * axis.count_m * np.sqrt(times_s)
-        quiet = (QUIET * error / gains.jerk_m_per_s3) ** (2 / 7)
-        agile = (AGILE * error / gains.acceleration_m_per_s2) ** (2 / 5)
-        least = np.maximum(self._unit_s, times_s / INDEX_MAX)
-        quiet = np.clip(quiet, least, self._unit_s * 2.0 ** (self.time_bits - 1))
-        return quiet, np.clip(agile, least, quiet)
-
-    def _derive_limits(self, axis: AxisRequirements, gains: Gains) -> None:
-        """Derive the memories and bounds by the error and the time; lengths are in half octaves."""
-        times_s = _middles(np.arange(1 << self.row_bits)) * self._unit_s
+    def _derive_tables(self, axis: AxisRequirements, gains: Gains) -> None:
+        """Derive the tables, for the error that is stated and for its halves."""
+        times = tables.Times(self._unit_s, self.time_bits, self._per_sample)
         own = gains.edge_error_counts * 2.0 ** -np.arange(self.halvings_max + 1)[:, None]
-        errors = np.hypot(own, self._stamp_errors_counts(axis, times_s))
-        self.quiet_s, self.agile_s = self._memories(axis, gains, times_s, errors)
-        blend = -np.expm1(-times_s / self.agile_s)
-        kx = [steady_state(index)[0] for index in (times_s / self.quiet_s).ravel().tolist()]
-        free = np.maximum(1 - np.reshape(kx, errors.shape), np.finfo(float).eps)
-        usual = errors / np.sqrt(free) * self._per_sample
-        alarm = ALARM * usual * np.sqrt(blend / (2 - blend))
-        lengths = [2 * np.log2(memory / self._unit_s / _middles(0)) for memory in (self.quiet_s, self.agile_s)]
-        columns = blend, alarm, math.sqrt(2 / math.pi) * usual, *lengths
-        self.limit_rates = np.stack([column.ravel() for column in columns], 1)
-
-    def _derive_gains(self) -> None:
-        """Derive the gains by T / M: they need no axis."""
-        index = INDEX_MAX * 2.0 ** (-np.arange(GAIN_ROWS) / 2)
-        gain = np.array([steady_state(each) for each in index.tolist()])
-        grow = 2 * GROWTH / math.log(2) * index
-        rates = gain[:, 1:] / gain[:, :-1] / index[:, None]
-        # The words of M's parity: 1 / M is 2**(-parity / 2) / _middles(0), but for whole octaves.
-        parity = 2.0 ** (-np.arange(2) / 2) / _middles(0)
-        columns = [np.repeat(column, 2) for column in (grow, gain[:, 0])]
-        columns += [np.outer(column, parity).ravel() for column in rates.T]
-        self.gain_rates = np.stack(columns, 1)
+        passed = self._passed_counts(axis, tables.middles(np.arange(1 << self.row_bits)) * self._unit_s)
+        motion = gains.jerk_m_per_s3 / axis.count_m, gains.acceleration_m_per_s2 / axis.count_m
+        self.quiet_s, self.agile_s, self.limit_rates = tables.limits(
+            np.hypot(own, passed / math.sqrt(12)), *motion, times
+        )
+        self.columns = tables.limit_formats(self.limit_rates)
+        self.limits = tables.words(self.limit_rates, self.columns)
+        self.shortest = tables.whole_octaves(int(self.limits[:, tables.AGILE_AT].min()))
 
     def _derive_motion(self, axis: AxisRequirements) -> None:
         """Derive the formats of the states and of the output."""
@@ -354,28 +261,8 @@ class Design(Accelerated):
         row = min(2 * bits_for(max(self._per_sample, 1.0)), self.agile_s.shape[1] - 1)
         return float(self.agile_s[0, row]) * axis.sample_hz
 
-    def _derive_words(self) -> None:
-        """Derive the formats of the columns, and round the tables to words."""
-        integer = [0]
-        for column in (ALARM_AT, USUAL):
-            top, least, width = (
-                self.limit_rates[:, column].max(),
-                self.limit_rates[:, column].min(),
-                LIMIT_WIDTHS[column],
-            )
-            # A bound that is beyond the range of the format is none; the least is resolved to an eighth.
-            integer.append(min(bits_for(float(top)), width - 3 + bits_for(float(least))))
-        integer += [LENGTH.i, LENGTH.i]
-        self.columns = tuple(UQ(i, width - i) for i, width in zip(integer, LIMIT_WIDTHS, strict=True))
-        self.limits = _words(self.limit_rates, self.columns)
-        self.gain_words = _words(self.gain_rates, GAIN_FORMATS)
-        # A memory that grows at all comes to its end.
-        self.gain_words[:, GROW] = np.maximum(self.gain_words[:, GROW], 1)
-        half = 1 << (LENGTH.f - 1)
-        self.shortest = int((self.limits[:, AGILE_AT].min() + half >> LENGTH.f) // 2)
-
     def params(self, words: Mapping[str, int]) -> Params:
-        v, a, e, rate_f = self.motion, self.a, self.error, GAIN_BITS - 1 + self.shortest
+        v, a, e, rate_f = self.motion, self.a, self.error, tables.GAIN_BITS - 1 + self.shortest
         return Params(
             count_width=self.count_width,
             unit=self.unit,
@@ -385,8 +272,8 @@ class Design(Accelerated):
             place_shift=self.unit - e.f + scale_map.FRACTION_BITS,
             travel_shift=v.f - e.f,
             error_max=e.max,
-            alarm_shift=e.f - self.columns[ALARM_AT].f,
-            usual_shift=e.f - self.columns[USUAL].f,
+            alarm_shift=e.f - self.columns[tables.ALARM_AT].f,
+            usual_shift=e.f - self.columns[tables.USUAL].f,
             halvings_max=self.halvings_max,
             shortest=self.shortest,
             velocity_shift=e.f + rate_f - v.f,
@@ -404,7 +291,7 @@ class Design(Accelerated):
             bursts=self.bursts,
             row_bits=self.row_bits,
             limits=self.limits,
-            gains=self.gain_words,
+            gains=tables.gain_words(),
             scale=scale_map.nothing(),
         )
 
@@ -423,20 +310,9 @@ class Design(Accelerated):
             row_bits=self.row_bits,
             halvings_max=self.halvings_max,
             limits=self.limit_rates,
-            gains=self.gain_rates,
+            gains=tables.gain_rates(),
             scale=scale_map.nothing(True),
         )
 
     def start(self, floating: bool = False) -> State:
         return FLOAT_START if floating else START
-
-
-def _middles(rows: np.ndarray | int) -> np.ndarray:
-    """Return the geometric middle of the times of a row, units: from 2 to 3, or from 3 to 4, times a power of two."""
-    return math.sqrt(1.5) / 2 * 2.0 ** (np.asarray(rows) / 2)
-
-
-def _words(rates: np.ndarray, formats: tuple[UQ, ...]) -> np.ndarray:
-    """Return the words of a table's columns, rounded half up, and held within their formats."""
-    words = [np.clip(np.floor(rates[:, n] * 2.0**fmt.f + 0.5), 0, fmt.max) for n, fmt in enumerate(formats)]
-    return np.stack(words, 1).astype(np.int64)

@@ -6,7 +6,8 @@ from fractions import Fraction
 from hardwall.model.encoder.quadrature import Seen
 from hardwall.model.estimators.bursts import NOTHING, watch
 from hardwall.model.estimators.count_kalman import Filter
-from hardwall.model.estimators.edge_kalman_design import GAIN_FORMATS, Design
+from hardwall.model.estimators.edge_kalman_design import Design
+from hardwall.model.estimators.edge_kalman_tables import GAIN_FORMATS, gain_words
 
 
 class Oracle:
@@ -55,7 +56,7 @@ class Oracle:
     def gains(self, memory: int, time: int) -> list[Fraction]:
         """Return the memory's growth over the time and K_x, K_v / K_x, K_a / K_v, for whole half octaves."""
         # The longest time is twice the memory, two half octaves more.
-        row = self.d.gain_words[2 * (memory - time + 2) + memory % 2]
+        row = gain_words()[2 * (memory - time + 2) + memory % 2]
         words = [int(word) * Fraction(2) ** -fmt.f for word, fmt in zip(row, GAIN_FORMATS, strict=True)]
         # Of a rate, 24 bits are kept, the first of which is a 1 before the point for the shortest memory.
         kept = 23 + self.d.shortest

@@ -8,7 +8,15 @@ import pytest
 import scipy.linalg
 
 from hardwall.model.estimators import edge_kalman
-from hardwall.model.estimators.edge_kalman_design import AGILE_AT, GAIN_BITS, GAIN_FORMATS, GROW, HALVINGS, QUIET_AT
+from hardwall.model.estimators.edge_kalman_tables import (
+    AGILE_AT,
+    GAIN_BITS,
+    GAIN_FORMATS,
+    GROW,
+    HALVINGS,
+    QUIET_AT,
+    gain_words,
+)
 from stimuli.specs import spec
 
 
@@ -48,7 +56,7 @@ def test_the_memories_are_where_the_motion_may_do_what_the_edges_hide(name, halv
 
 def gains_at(d: edge_kalman.Design, memory: int, time: int) -> np.ndarray:
     """Return the words' K_x, K_v and K_a for a memory and a time in half octaves, in units."""
-    _, kx, kv, ka = d.gain_words[2 * (memory - time + 2) + memory % 2] * [fmt.lsb for fmt in GAIN_FORMATS]
+    _, kx, kv, ka = gain_words()[2 * (memory - time + 2) + memory % 2] * [fmt.lsb for fmt in GAIN_FORMATS]
     kept = GAIN_BITS - 1 + d.shortest
     faster, bent = (math.floor(rate / 2 ** (memory // 2) * 2**kept) / 2**kept for rate in (kv, ka))
     return np.array([kx, kx * faster, kx * faster * bent])
@@ -102,10 +110,10 @@ def test_what_every_memory_and_time_make_is_within_its_word(name, estimator, edg
     d = replace(spec(name, estimator), edge_error_max_counts=edge_error_counts).design.estimator
     d = getattr(d, "filter", d)
     assert d.limits.min() >= 0
-    assert d.gain_words.min() >= 0
-    for words, formats in ((d.limits, d.columns), (d.gain_words, GAIN_FORMATS)):
+    assert gain_words().min() >= 0
+    for words, formats in ((d.limits, d.columns), (gain_words(), GAIN_FORMATS)):
         assert np.all(words.max(axis=0) <= [fmt.max for fmt in formats])
-    growths = d.gain_words[::2, GROW].tolist()
+    growths = gain_words()[::2, GROW].tolist()
     # A time in use has a bit less than a stamp.
     for row in (row for row in range(len(d.limits)) if row % (1 << d.row_bits) < 2 * d.time_bits):
         time = row % (1 << d.row_bits)
