@@ -43,7 +43,7 @@ class Estimator(AcceleratedBlock):
         at an edge       r = n D - (v + a T/2) T - x
                          z <- z + blend (r - z)
                          the memory is agile if |z| is above its bound, and else grows with T
-                         the error of an edge is halved or doubled by the mean of |r|
+                         the error of an edge is halved or doubled by how often |r| is above the usual
                          x <- K_x r - r,  v <- v + a T + K_v r,  a <- a + K_a r
         at every sample  line = v + a s, held within the bound for no further edge
 
@@ -197,10 +197,11 @@ class Estimator(AcceleratedBlock):
         travelled = shift_floor(s.total, p.travel_shift)
         limited = saturate(s.far, -p.error_max, p.error_max)
         # The low bits of a memory of the table are 0, so its words are compared with the top bits alone.
-        quiet, agile = s.limit[QUIET_AT], s.limit[AGILE_AT]
-        held = Mux(s.memory[LENGTH_SHIFT:] < agile, agile << LENGTH_SHIFT, s.memory)
+        quiet, agile = s.limit[QUIET_AT] << LENGTH_SHIFT, s.limit[AGILE_AT] << LENGTH_SHIFT
+        short = s.memory[LENGTH_SHIFT:] < s.limit[AGILE_AT]
+        long = s.grown[LENGTH_SHIFT:] >= s.limit[QUIET_AT]
         return {
-            "TURN": [s.turned, s.behind.eq(s.way - s.place), s.grown.eq(s.at_most(held, quiet))],
+            "TURN": [s.turned, s.behind.eq(s.way - s.place), s.grown.eq(Mux(short, agile, s.memory))],
             "TRAVEL": [
                 s.left.eq(s.v + (s.turn >> 1)),
                 s.right.eq(s.interval),
@@ -209,12 +210,12 @@ class Estimator(AcceleratedBlock):
             ],
             "TRAVEL LOW": [],
             "TRAVEL HIGH": [s.waits(p.travel_shift), s.grown.eq(s.grown + s.gain[GROW])],
-            "TRAVEL SUM": [s.summed, s.grown.eq(s.at_most(s.grown, quiet))],
+            "TRAVEL SUM": [s.summed, s.grown.eq(Mux(long, quiet, s.grown))],
             "DISTANCE": [s.far.eq(s.behind - travelled)],
             "INNOVATION": [s.r.eq(limited), s.flags[0].eq(s.correct & (s.beyond | (limited != s.far)))],
             "MEAN": [s.left.eq(s.r - s.mean), s.right.eq(s.limit[BLEND])],
             "MEAN LOW": [],
-            "MEAN HIGH": [s.waits(0)],
+            "MEAN HIGH": [s.waits(BLEND_BITS)],
             "MEAN SUM": [s.summed],
             "BLEND": [],
         }
@@ -227,7 +228,7 @@ class Estimator(AcceleratedBlock):
         faster = saturate(far_faster, ~p.turn_max, p.turn_max)
         return {
             "ALARM": [s.alarm.eq(magnitude > s.limit[ALARM_AT])],
-            "MEMORY": [s.length.eq(s.nearest(s.remembered))],
+            "MEMORY": [],
             "READ": [],
             "GAINS": [s.left.eq(s.r), s.right.eq(s.gain[KX]), s.word.eq(s.gain[KV])],
             "PLACE LOW": [],
@@ -306,8 +307,11 @@ class Estimator(AcceleratedBlock):
                 with m.If(s.correct):
                     m.d.sync += s.mean.eq(s.mean + (s.total >> BLEND_BITS))
             case "MEMORY":
+                agile = s.limit[AGILE_AT] << LENGTH_SHIFT
                 with m.If(s.correct):
-                    m.d.sync += s.memory.eq(s.remembered)
+                    m.d.sync += s.memory.eq(Mux(s.alarm, agile, s.grown))
+                with m.If(s.alarm):
+                    m.d.sync += s.length.eq(s.nearest(agile))
             case "VELOCITY":
                 with m.If(s.correct):
                     m.d.sync += s.place.eq(s.nearer - s.r)
@@ -337,8 +341,9 @@ class Estimator(AcceleratedBlock):
             case "MEAN":
                 m.d.sync += s.large.eq(shift_floor(s.without_sign(s.r), p.usual_shift) > s.limit[USUAL])
             case "MEAN LOW":
-                with m.If(s.correct):
-                    m.d.sync += s.share.eq(s.share + (((s.large << SHARE_BITS) - s.share) >> LEARN_BITS))
+                change = shift_round_half_up((s.large << SHARE_BITS) - s.share, LEARN_BITS)
+                with m.If(s.correct & (s.passed != 0)):
+                    m.d.sync += s.share.eq(s.share + change)
             case "MEAN HIGH":
                 with m.If((s.share > WORSE) & (s.halvings != 0)):
                     m.d.sync += [s.share.eq(USUAL_SHARE), s.halvings.eq(s.halvings - 1)]

@@ -1,12 +1,10 @@
 """The registers and wires of `edge_kalman`, by the names that the model uses."""
 
-from amaranth.hdl import Cat, Const, Mux, Signal, signed, unsigned
+from amaranth.hdl import Cat, Const, Signal, signed, unsigned
 
 from hardwall.model.encoder.scale_map import FRACTION_BITS
-from hardwall.model.estimators.edge_kalman import LENGTH_SHIFT
 from hardwall.model.estimators.edge_kalman_design import Design
 from hardwall.model.estimators.edge_kalman_tables import (
-    AGILE_AT,
     GAIN_BITS,
     GAIN_FORMATS,
     GAIN_ROWS,
@@ -98,7 +96,6 @@ class Signals:
         self.time = Cat((self.interval_size > 1) & next_bit, self.interval_size)[: d.row_bits]
 
         self.grown, self.alarm = Signal.like(self.memory), Signal()
-        self.remembered = Mux(self.alarm, self.limit[AGILE_AT] << LENGTH_SHIFT, self.grown)
         self.length, self.word = Signal(LENGTH.i), Signal(GAIN_FORMATS[KV].width)
         self.rate = Signal(GAIN_BITS)
 
@@ -106,11 +103,6 @@ class Signals:
     def nearest(memory):
         """Return a memory to the nearest half octave."""
         return memory[MEMORY_BITS:] + memory[MEMORY_BITS - 1]
-
-    @staticmethod
-    def at_most(memory, word):
-        """Return a memory, or the table's if that is shorter."""
-        return Mux(memory[LENGTH_SHIFT:] >= word, word << LENGTH_SHIFT, memory)
 
     @staticmethod
     def without_sign(value):

@@ -28,8 +28,9 @@ What is learned. Both memories and the bound follow from the error of an edge. T
 is for the worst edge of the worst encoder. The filter begins with it, and counts the edges whose |r| is above the mean
 that this error makes usual. Of independent normal errors these are 0.42. The share of the last 2**LEARN_BITS edges or
 so is what tells. Below BETTER the errors are 0.56 of those in use or less, and the error in use is halved, up to
-HALVINGS times. Above WORSE they are twice as large or more, and it is doubled, up to what the axis states. Every edge
+HALVINGS times. Above WORSE they are 1.6 times those or more, and it is doubled, up to what the axis states. Every edge
 counts for one, however large its innovation: a start, an impact or a single displaced edge teaches next to nothing. An
+edge that is crossed back has its own error twice, and teaches nothing. An
 encoder that is better than stated gets shorter memories and finer alarms. What was learned is kept over a rest, and
 forgotten with `restart`.
 
@@ -195,22 +196,25 @@ def _innovation(params, state, interval, passed, number, turn):
 
 
 @compiled
-def _remembered(params, state, r, time):
-    """Return (memory, mean, share, halvings) after an innovation."""
+def _remembered(params, state, r, time, passed):
+    """Return (memory, the length that the gains are for, mean, share, halvings) after an innovation."""
     limits = params.limits[state.halvings << params.row_bits | time]
     agile, quiet = limits[AGILE_AT] << LENGTH_SHIFT, limits[QUIET_AT] << LENGTH_SHIFT
-    before = min(max(state.memory, agile), quiet)
-    memory = min(before + params.gains[_gains_row(_nearest(before), time), GROW], quiet)
-    mean = state.mean + shift_floor(limits[BLEND] * (r - state.mean), BLEND_BITS)
+    memory = max(state.memory, agile)
+    length = _nearest(memory)
+    memory = min(memory + params.gains[_gains_row(length, time), GROW], quiet)
+    mean = state.mean + shift_round_half_up(limits[BLEND] * (r - state.mean), BLEND_BITS)
     if shift_floor(_size(mean), params.alarm_shift) > limits[ALARM_AT]:
-        memory = agile
+        memory, length = agile, _nearest(agile)
+    if passed == 0:
+        return memory, length, mean, state.share, state.halvings
     large = int(shift_floor(_size(r), params.usual_shift) > limits[USUAL]) << SHARE_BITS
-    share, halvings = state.share + ((large - state.share) >> LEARN_BITS), state.halvings
+    share, halvings = state.share + shift_round_half_up(large - state.share, LEARN_BITS), state.halvings
     if share > WORSE and halvings > 0:
         share, halvings = USUAL_SHARE, halvings - 1
     elif share < BETTER and halvings < params.halvings_max:
         share, halvings = USUAL_SHARE, halvings + 1
-    return memory, mean, share, halvings
+    return memory, length, mean, share, halvings
 
 
 @compiled
@@ -225,8 +229,7 @@ def _correct(params, state, interval, passed, number):
     time = _half_octaves(interval)
     turn = _turn(params, state.acceleration, interval)
     r, beyond = _innovation(params, state, interval, passed, number, turn)
-    memory, mean, share, halvings = _remembered(params, state, r, time)
-    length = _nearest(memory)
+    memory, length, mean, share, halvings = _remembered(params, state, r, time, passed)
     gains = params.gains[_gains_row(length, time)]
 
     nearer = shift_round_half_up(gains[KX] * r, KX_BITS)
@@ -288,20 +291,23 @@ def _float_nearest(memory):
 
 
 @compiled
-def _float_remembered(params, state, r, time):
+def _float_remembered(params, state, r, time, passed):
     limits = params.limits[state.halvings << params.row_bits | time]
-    before = min(max(state.memory, limits[AGILE_AT]), limits[QUIET_AT])
-    memory = min(before + params.gains[_gains_row(_float_nearest(before), time), GROW], limits[QUIET_AT])
+    memory = max(state.memory, limits[AGILE_AT])
+    length = _float_nearest(memory)
+    memory = min(memory + params.gains[_gains_row(length, time), GROW], limits[QUIET_AT])
     mean = state.mean + limits[BLEND] * (r - state.mean)
     if abs(mean) > limits[ALARM_AT]:
-        memory = limits[AGILE_AT]
+        memory, length = limits[AGILE_AT], _float_nearest(limits[AGILE_AT])
+    if passed == 0:
+        return memory, length, mean, state.share, state.halvings
     large = int(abs(r) > limits[USUAL]) << SHARE_BITS
     share, halvings = state.share + (large - state.share) * 2.0**-LEARN_BITS, state.halvings
     if share > WORSE and halvings > 0:
         share, halvings = float(USUAL_SHARE), halvings - 1
     elif share < BETTER and halvings < params.halvings_max:
         share, halvings = float(USUAL_SHARE), halvings + 1
-    return memory, mean, share, halvings
+    return memory, length, mean, share, halvings
 
 
 @compiled
@@ -310,8 +316,7 @@ def _float_correct(params, state, interval, passed, number):
     turn = state.acceleration * interval
     exact = passed + _displaced(params, state, number)
     r = exact * params.per_sample - (state.velocity + turn / 2) * interval - state.place
-    memory, mean, share, halvings = _float_remembered(params, state, r, time)
-    length = _float_nearest(memory)
+    memory, length, mean, share, halvings = _float_remembered(params, state, r, time, passed)
     gains = params.gains[_gains_row(length, time)]
 
     nearer = gains[KX] * r

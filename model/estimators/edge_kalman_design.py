@@ -14,8 +14,8 @@ Formats.
 - `error`, r, and the state's place x: edges times D. i holds the edges that twice the largest speed makes in two
   samples and two agile memories: a start in motion is caught up in this time. f is one more than the velocity's, less
   the bits of D: a place off by half an LSB at every edge is a velocity off by a quarter of the output's LSB.
-- `a`, in counts a sample per unit: i holds 2**ACCELERATION_BITS C, f turns the velocity by a quarter of its LSB over
-  the longest memory.
+- `a`, in counts a sample per unit: i holds 2**ACCELERATION_BITS C, at most four times the velocity's range in a unit;
+  f turns the velocity by a quarter of its LSB over the longest memory.
 - `acceleration`, the second output, in counts a sample^2: a D, rounded down. i holds the largest a, f resolves C to
   2**-C_BITS. D has no more bits here than a time.
 - The next edge is at most 1 + m counts from the last one, m = ROOM s and at least LEAST_ROOM: ROOM s are 3.5 standard
@@ -48,7 +48,7 @@ ROOM = 5.0
 LEAST_ROOM = 0.25
 """The least such distance, counts: the line has errors of its own."""
 TOLERATED = 0.5
-"""The silence between bursts that is tolerated, in memories of the shortest."""
+"""The silence between bursts that is tolerated, in the shortest memories for the stated error."""
 SPEED_BITS = 14
 """The velocity resolves sqrt(C q), the speed that C gives within half a count, to 2**-SPEED_BITS."""
 GUARD_BITS = 6
@@ -59,6 +59,8 @@ C_BITS = 20
 """The acceleration that is given out resolves C to 2**-C_BITS."""
 TIME_BITS = 27
 """The most bits of a stamp that are used; a time in use has one less."""
+WORD_BITS, SHIFT_MAX = 63, 62
+"""Bits of a product in int64, and the most that a word is shifted."""
 MOTION_MAX, ERROR_MAX = 35, 38
 """Largest widths of velocity and acceleration, and of the error, bits."""
 STEPS = 44
@@ -224,7 +226,7 @@ class Design(Accelerated):
         self.quiet_s, self.agile_s, self.limit_rates = tables.limits(
             np.hypot(own, passed / math.sqrt(12)), *motion, times
         )
-        self.columns = tables.limit_formats(self.limit_rates)
+        self.columns = tables.limit_formats(self.limit_rates, times)
         self.limits = tables.words(self.limit_rates, self.columns)
         self.shortest = tables.whole_octaves(int(self.limits[:, tables.AGILE_AT].min()))
 
@@ -246,23 +248,33 @@ class Design(Accelerated):
         i = 1 + bits_for(reach * self._per_sample)
         f = self.velocity.f + 1 - math.floor(math.log2(self._per_sample))
         self.error = SQ(i, max(min(f, ERROR_MAX - i), 2 - i))
-        self.distance = SQ(min(1 + bits_for(reach), axis.count_width), 0)
+        widest = WORD_BITS - scale_map.FRACTION_BITS - self.clocks.bit_length()
+        self.distance = SQ(min(1 + bits_for(reach), axis.count_width, widest), 0)
 
-        i = 1 + ACCELERATION_BITS + bits_for(bound * tau * self._unit_s / q)
         longest = bits_for(self.quiet_s.max() / self._unit_s)
-        self.a = SQ(i, max(min(self.velocity.f + 2 + longest, MOTION_MAX - i), 2 - i))
+        finest = min(self.velocity.f + 2 + longest, self.motion.f + self._rate_f)
+        i = 1 + ACCELERATION_BITS + bits_for(bound * tau * self._unit_s / q)
+        i = min(max(i, 2 - finest), self.motion.i + 2)
+        self.a = SQ(i, min(finest, MOTION_MAX - i))
         cut = max(self.clocks.bit_length() - self.time_bits, 0)
         self.per_sample, self.per_sample_f = self.clocks >> cut, self.unit - cut
         finest = C_BITS - math.floor(math.log2(bound * tau**2 / q))
-        self.acceleration = SQ(i + bits_for(self._per_sample), min(finest, self.a.f + self.per_sample_f))
+        i += bits_for(self._per_sample)
+        self.acceleration = SQ(i, max(min(finest, self.a.f + self.per_sample_f), 2 - i))
 
     def _agile_samples(self, axis: AxisRequirements) -> float:
         """Return the agile memory for an edge a sample, in samples."""
         row = min(2 * bits_for(max(self._per_sample, 1.0)), self.agile_s.shape[1] - 1)
         return float(self.agile_s[0, row]) * axis.sample_hz
 
+    @property
+    def _rate_f(self) -> int:
+        """The fraction bits of a rate."""
+        return tables.GAIN_BITS - 1 + self.shortest
+
     def params(self, words: Mapping[str, int]) -> Params:
-        v, a, e, rate_f = self.motion, self.a, self.error, tables.GAIN_BITS - 1 + self.shortest
+        v, a, e, rate_f = self.motion, self.a, self.error, self._rate_f
+        bound_max = 2 * self.velocity.max << GUARD_BITS
         return Params(
             count_width=self.count_width,
             unit=self.unit,
@@ -272,8 +284,8 @@ class Design(Accelerated):
             place_shift=self.unit - e.f + scale_map.FRACTION_BITS,
             travel_shift=v.f - e.f,
             error_max=e.max,
-            alarm_shift=e.f - self.columns[tables.ALARM_AT].f,
-            usual_shift=e.f - self.columns[tables.USUAL].f,
+            alarm_shift=min(e.f - self.columns[tables.ALARM_AT].f, SHIFT_MAX),
+            usual_shift=min(e.f - self.columns[tables.USUAL].f, SHIFT_MAX),
             halvings_max=self.halvings_max,
             shortest=self.shortest,
             velocity_shift=e.f + rate_f - v.f,
@@ -285,8 +297,8 @@ class Design(Accelerated):
             output_shift=GUARD_BITS,
             per_sample=self.per_sample,
             sample_shift=a.f + self.per_sample_f - self.acceleration.f,
-            bound=math.floor(2 * self._apart * self._per_sample * 2.0**v.f),
-            bound_max=2 * self.velocity.max << GUARD_BITS,
+            bound=min(math.floor(2 * self._apart * self._per_sample * 2.0**v.f), bound_max << self.time_bits - 1),
+            bound_max=bound_max,
             doubt=self.doubt,
             bursts=self.bursts,
             row_bits=self.row_bits,

@@ -57,11 +57,11 @@ INDEX_MAX = 2.0
 """The largest T / M of the gains: at this one the filter is stable, with some room, over all times of a row."""
 HALVINGS = 7
 """The most halvings of an edge's error, where it is learned."""
-LEARN_BITS = 6
+LEARN_BITS = 7
 """An edge has 2**-LEARN_BITS of the share of the edges with an innovation larger than usual."""
-SHARE_BITS = 10
+SHARE_BITS = 12
 """Fraction bits of this share."""
-USUAL_SHARE, WORSE, BETTER = 448, 704, 160
+USUAL_SHARE, WORSE, BETTER = 1792, 2560, 640
 """The share that a change begins with, and those above and below which the error is doubled and halved."""
 MEMORY_BITS = 16
 """Fraction bits of a memory, which is counted in half octaves."""
@@ -128,12 +128,13 @@ def limits(
     return quiet_s, agile_s, np.stack([column.ravel() for column in columns], 1)
 
 
-def limit_formats(rates: np.ndarray) -> tuple[UQ, ...]:
-    """Return the formats of the columns of `limits`."""
+def limit_formats(rates: np.ndarray, times: Times) -> tuple[UQ, ...]:
+    """Return the formats of the columns of `limits`: times in use have a bit less than a stamp."""
+    used = rates.reshape(-1, 1 << bits_for(2 * times.bits), rates.shape[1])[:, : 2 * times.bits]
     integer = {BLEND: 0, QUIET_AT: LENGTH.i, AGILE_AT: LENGTH.i}
     for column in (ALARM_AT, USUAL):
-        top, least = float(rates[:, column].max()), float(rates[:, column].min())
-        # A bound that is beyond the range of the format is none; the least is resolved to an eighth.
+        top, least = float(used[..., column].max()), float(used[..., column].min())
+        # The least is resolved to an eighth. A bound beyond the format is held at its end.
         integer[column] = min(bits_for(top), LIMIT_WIDTHS[column] - 3 + bits_for(least))
     return tuple(UQ(integer[n], width - integer[n]) for n, width in enumerate(LIMIT_WIDTHS))
 

@@ -122,7 +122,7 @@ class Oracle:
         edges = max(-d.distance.max, min(d.distance.max, passed))
         far = self.to(Fraction(edges * d.clocks, 1 << d.unit), e.f) - self.half_up(mean * interval, e.f) - self.x
         r = self.held(far, e)
-        memory = self.remember(r, time)
+        memory = self.remember(r, time, passed)
         _, kx, kv, ka = self.gains(memory, time)
         nearer = self.half_up(kx * r, e.f)
         self.x = nearer - r
@@ -139,18 +139,21 @@ class Oracle:
         """Return the magnitude of a word of the error, less an LSB if it is negative."""
         return value if value >= 0 else -value - Fraction(2) ** -self.d.error.f
 
-    def remember(self, r: Fraction, time: int) -> int:
-        """Change the mean, the memory and what is learned by an innovation; return the memory in half octaves."""
+    def remember(self, r: Fraction, time: int, passed: int) -> int:
+        """Change the mean, the memory and what is learned by an innovation; return the half octaves of the gains."""
         d, e = self.d, self.d.error
         blend, alarm, usual, quiet, agile = self.limits(time)
-        before = min(max(self.memory, agile), quiet)
+        before = max(self.memory, agile)
         grow, *_ = self.gains(math.floor(before + Fraction(1, 2)), time)
-        self.z += self.to(blend * (r - self.z), e.f)
+        self.z += self.half_up(blend * (r - self.z), e.f)
         alarmed = self.to(self.size(self.z), d.columns[1].f) > alarm
         self.memory = agile if alarmed else min(before + grow, quiet)
+        used = math.floor((agile if alarmed else before) + Fraction(1, 2))
+        if not passed:  # its own error is in the innovation twice
+            return used
         large = int(self.to(self.size(r), d.columns[2].f) > usual)
-        self.share += self.to((large - self.share) / 64, 10)
-        change = int(self.share < Fraction(5, 32)) - int(self.share > Fraction(11, 16))
+        self.share += self.half_up((large - self.share) / 128, 12)
+        change = int(self.share < Fraction(5, 32)) - int(self.share > Fraction(5, 8))
         if change and 0 <= self.halvings + change <= self.most:
             self.share, self.halvings = Fraction(7, 16), self.halvings + change
-        return math.floor(self.memory + Fraction(1, 2))
+        return used
