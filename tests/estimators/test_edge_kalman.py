@@ -317,21 +317,24 @@ def test_a_vibration_across_one_edge_teaches_nothing():
     assert {state.halvings for state in states(d, rows)} == {0}
 
 
+class Told(edge_kalman.Design):
+    """A filter that is told the error, and cannot learn."""
+
+    halvings_max = 0
+
+
 @pytest.mark.parametrize("ratio", [0.6, 0.7, 0.8])
 def test_an_error_between_two_halvings_costs_little(ratio):
     """The velocity's deviation beside that of a filter which is told the error, and cannot learn: half more at most."""
     every, sigma, samples = 20, 0.05 * ratio, 400_000
+    axis = replace(spec("mhz", "edge-kalman"), edge_error_max_counts=sigma)
 
-    def deviation(d: edge_kalman.Design, params) -> float:
+    def deviation(d: edge_kalman.Design) -> float:
         displaced = np.round(sigma * every * d.clocks * np.random.default_rng(7).standard_normal(samples)).astype(int)
-        last, velocity = START, np.zeros(samples)
-        for k, row in enumerate(steady(d, samples, every, displaced=displaced)):
-            last, velocity[k], _ = estimate(params, last, Seen(*row[:9]), 0)
-        return velocity[samples // 4 :].std()
+        seen = walk(d, steady(d, samples, every, displaced=displaced))
+        return np.std([velocity for velocity, _ in seen[samples // 4 :]])
 
-    d = design("mhz")
-    exact = replace(spec("mhz", "edge-kalman"), edge_error_max_counts=sigma).design.estimator
-    assert deviation(d, d.params({})) < 1.5 * deviation(exact, exact.params({})._replace(halvings_max=0))
+    assert deviation(design("mhz")) < 1.5 * deviation(Told(axis, edge_kalman.Gains.default(axis)))
 
 
 def test_a_speed_that_jumps_is_hardly_an_error_of_edges():
