@@ -57,9 +57,9 @@ class Estimator(AcceleratedBlock):
     Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`. One multiplier makes
     all eight products, each in two halves: the right operand is wider than a multiplier of the part.
 
-    Rounding and overflow: the values that a product corrects are rounded half up; the change of velocity, the mean and
-    the bound are rounded down, and so the line half up; a D is rounded down. Velocities and the error of the place
-    saturate, with flags; the acceleration saturates, which is its limit. Count and stamp may wrap.
+    Rounding and overflow: the values that a product corrects are rounded half up, and so are the mean, the share of
+    large innovations and the line; the change of velocity, the bound and a D are rounded down. Velocities and the error
+    of the place saturate, with flags; the acceleration saturates, which is its limit. Count and stamp may wrap.
 
     Parameters
     ----------
@@ -234,11 +234,7 @@ class Estimator(AcceleratedBlock):
             "PLACE LOW": [],
             "PLACE HIGH": [s.waits(KX_BITS)],
             "PLACE SUM": [s.summed],
-            "VELOCITY": [
-                s.left.eq(s.nearer),
-                s.right.eq(s.rate),
-                s.word.eq(s.gain[KA]),
-            ],
+            "VELOCITY": [s.left.eq(s.nearer), s.right.eq(s.rate), s.word.eq(s.gain[KA])],
             "VELOCITY LOW": [],
             "VELOCITY HIGH": [s.waits(p.velocity_shift)],
             "VELOCITY SUM": [s.summed],

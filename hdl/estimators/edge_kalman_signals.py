@@ -5,10 +5,12 @@ from amaranth.hdl import Cat, Const, Signal, signed, unsigned
 from hardwall.model.encoder.scale_map import FRACTION_BITS
 from hardwall.model.estimators.edge_kalman_design import Design
 from hardwall.model.estimators.edge_kalman_tables import (
+    BLEND,
     GAIN_BITS,
     GAIN_FORMATS,
     GAIN_ROWS,
     KV,
+    KX,
     LENGTH,
     LIMIT_WIDTHS,
     MEMORY_BITS,
@@ -58,7 +60,7 @@ class Signals:
         self._place(d)
 
         # The multiplier: the low limb's product waits, with half of what is rounded off, for the high limb's.
-        wide = max(d.time_bits, GAIN_BITS, *LIMIT_WIDTHS[:1], *(fmt.width for fmt in GAIN_FORMATS))
+        wide = max(d.time_bits, GAIN_BITS, LIMIT_WIDTHS[BLEND], GAIN_FORMATS[KX].width)
         self.left = Signal(signed(max(d.motion.width + 1, d.a.width, d.error.width + 1)))
         self.right, self.limb = Signal(wide), Signal(max(LIMB_BITS, wide - LIMB_BITS))
         self.product = Signal(signed(len(self.left) + len(self.limb)))
