@@ -15,7 +15,7 @@ WORDS, LONGEST, AVERAGE, NUMBERS = 1500, 25, 18, 2
 RESULTS = [name for name in PAGES if name.startswith("docs/results/")]
 RESULTS_WORDS = 800
 ROOMS = "cli", "docs", "hdl", "host", "model", "sim"
-ARGUED = {"model/estimators/levant_adaptive.py", "model/estimators/levant_semi_implicit.py"}
+ARGUED = {"model/estimators/levant_semi_implicit.py"}
 """Modules whose docstrings hold a bound that they derive against what was measured."""
 
 

@@ -34,7 +34,7 @@ class Powers(Block):
     size : In
         The magnitude, unsigned.
     octaves : In
-        k, signed, within the design's; constant.
+        k, signed, within the design's; taken a clock after `start`.
     term_0, term_1, ... : Out
         The terms in the order of the design's, unsigned.
     done : Out(1)
@@ -64,13 +64,16 @@ class Powers(Block):
         design = self.design
         octave, step, empty = leading(m, design, self.size, self.octaves)
         quotient, rest = self._divided(m, octave)
+        # The octaves that this octave was found with.
+        octaves = Signal.like(self.octaves)
+        m.d.sync += octaves.eq(self.octaves)
         entry = Cat(step, rest)
         for number, (term, table) in enumerate(zip(design.terms, design.params.tables.tolist(), strict=True)):
             value, most = Signal(design.entry_bits[number], name=f"entry_{number}"), design.most[number]
             down = Signal(
                 range(most + 1 - int(design.params.shifts[number]) - design.octaves[0]), name=f"down_{number}"
             )
-            amount = times(quotient, term.power) + self.octaves + int(design.params.shifts[number])
+            amount = times(quotient, term.power) + octaves + int(design.params.shifts[number])
             m.d.sync += [
                 value.eq(Mux(empty, 0, entry_of(m, entry, table, f"table_{number}"))),
                 down.eq(most - amount),

@@ -50,8 +50,6 @@ class Estimator(AcceleratedBlock):
         m = Module()
         design = self.design
         m.submodules.powers = powers = self.unit_class(design.powers)
-        octaves = port(self, design.words[0].name)
-        m.d.comb += powers.octaves.eq(octaves)
 
         # The states. z1 has half of the output's LSB added; z0 is held as its distance from the last count, `lead`.
         w, half = Signal(shape(design.w)), design.half
@@ -100,7 +98,15 @@ class Estimator(AcceleratedBlock):
                     self.valid.eq(1),
                 ]
                 m.next = "SAMPLE"
+        m.d.comb += powers.octaves.eq(self._octaves(m, powers.start & ~first, powers.start & first, gap))
         return m
+
+    def _octaves(self, m: Module, judge: Value, begin: Value, gap: Signal) -> Value:
+        """Return by how many octaves L is raised. The form that adapts has them from the clock after these pulses on.
+
+        `judge` is high for one clock with the distance `gap` of a sample, `begin` with the distance of the first one.
+        """
+        return port(self, self.design.words[0].name)
 
     def _terms(self, powers: Block) -> list[Signal]:
         """Return the terms of the states, in their order."""

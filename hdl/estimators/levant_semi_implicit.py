@@ -45,14 +45,6 @@ class Estimator(EstimatorBlock):
         """Return a run-time word: 0 for lambda, 1 for alpha, 2 for the output."""
         return port(self, self.design.words[number].name)
 
-    def _alpha(self) -> Value:
-        """Return alpha, valid from state BAND on."""
-        return self._word(1)
-
-    def _adapt(self, m, first, negative, size) -> str:
-        """Add states between MAGNITUDE and BAND; return the name of the first of them, or BAND."""
-        return "BAND"
-
     def _factor(self, root) -> Value:
         """Return the factor of lambda in states MAGNITUDE and PRODUCT."""
         return Cat(Const(1, 1), root.root)
@@ -71,14 +63,14 @@ class Estimator(EstimatorBlock):
     def elaborate(self, platform):
         m = Module()
         velocity, error = self.design.velocity, self.design.error
-        most = velocity.max
+        most, alpha = velocity.max, self._word(1)
 
         lead = Signal(signed(max(error.width, velocity.width) + 1))
         u1 = Signal(shape(velocity))
 
         distance, negative = distance_of(self.design), Signal()
         size, near, beyond, rest = (Signal(error.width - 1) for _ in range(4))
-        difference = Signal(signed(max(len(size), len(self._alpha())) + 1))
+        difference = Signal(signed(max(len(size), len(alpha)) + 1))
         far_u1, far_u = (Signal(signed(max(len(size), len(u1)) + 2)) for _ in range(2))
         next_u1 = Signal.like(u1)
         # `near` is ready long before u1 is used.
@@ -91,7 +83,6 @@ class Estimator(EstimatorBlock):
         m.d.sync += self.valid.eq(0)
         with m.FSM():
             first = arrive(m, self, distance, lead, velocity.f, "MAGNITUDE")
-            after = self._adapt(m, first, negative, size)
             with m.State("MAGNITUDE"):
                 limited, over = magnitude(distance, error)
                 m.d.sync += [
@@ -100,14 +91,14 @@ class Estimator(EstimatorBlock):
                     self.saturated[0].eq(over),
                     product.eq(self._word(0) * factor),
                 ]
-                m.next = after
+                m.next = "BAND"
             with m.State("BAND"):
-                m.d.sync += difference.eq(size - self._alpha())
+                m.d.sync += difference.eq(size - alpha)
                 self._square(m, product)
                 m.next = "SPLIT"
             with m.State("SPLIT"):
                 within = difference < 0
-                m.d.sync += [near.eq(Mux(within, size, self._alpha())), beyond.eq(Mux(within, 0, difference))]
+                m.d.sync += [near.eq(Mux(within, size, alpha)), beyond.eq(Mux(within, 0, difference))]
                 m.next = "ROOT"
             correction = self._correct(m, root, factor, product, beyond)
             with m.State("OUTPUT"):

@@ -62,6 +62,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
+
 from ..arithmetic import powers
 from ..arithmetic.fixed import SQ, bits_for
 from ..checks import FieldError
@@ -136,7 +138,10 @@ class Params(NamedTuple):
     filtering: int
     count_width: int
     octaves: int
-    relay: int
+    relays: np.ndarray
+    """The correction of the last state by octave."""
+    least_octave: int
+    """The octave of the first relay."""
     fractions: tuple[int, ...]
     """Of w, z0, z1, z2, z3."""
     limits: tuple[int, ...]
@@ -174,6 +179,7 @@ class Design(Accelerated):
         order: the number of derivatives that are tracked.
         filtering: 1 with filtering, else 0.
         ahead: samples of a reversal by which `gap` is larger than the peak of z0 - f.
+        levels: octaves by which the form that adapts may lower L.
 
     Attributes:
         lipschitz: the designed L, counts a sample^(order + 1).
@@ -195,6 +201,7 @@ class Design(Accelerated):
     filtering: ClassVar[int] = 0
     powers: Any
     ahead: ClassVar[float] = 0.0
+    levels: ClassVar[int] = 0
 
     def __init__(self, axis: AxisRequirements, gains: JerkGains | SnapGains):
         super().__init__(axis, gains)
@@ -231,8 +238,8 @@ class Design(Accelerated):
         """Derive the formats."""
         order, top = self.order, min(OCTAVES[1], math.floor(math.log2(self.gains_class.largest / bound)))
         low, high = bound * 2.0 ** OCTAVES[0], bound * 2.0**top
-        step = 2 * axis.speed_max_counts_per_sample
-        own, slowest, fastest = (each ** (-1 / (order + 1)) for each in (bound, low, high))
+        step, lowered = 2 * axis.speed_max_counts_per_sample, 2.0**-self.levels
+        own, slowest, fastest = (each ** (-1 / (order + 1)) for each in (bound * lowered, low * lowered, high))
         tau_low, tau_high = ((step / each) ** (1 / order) for each in (low, high))
         peaks = PEAKS[order, self.filtering]
 
@@ -270,10 +277,11 @@ class Design(Accelerated):
         n_max = self.degree - 1
         gains = [LAMBDA[n_max][n] * bound ** ((self.degree - n) / self.degree) for n in range(n_max, -1, -1)]
         terms = tuple(powers.Term(n_max - j, gains[j], places[j]) for j in range(n_max))
-        self.powers = powers.Design(error.width - 1, error.f, self.degree, terms, (OCTAVES[0], top))
+        octaves = OCTAVES[0] - self.levels, top
+        self.powers = powers.Design(error.width - 1, error.f, self.degree, terms, octaves)
         last = round(gains[-1] * 2.0 ** places[-1])
-        self.relays = {k: last << k if k > 0 else last >> -k for k in range(OCTAVES[0], top + 1)}
-        if max(self.powers.widths) > WIDEST or not self.relays[OCTAVES[0]]:
+        self.relays = {k: last << k if k > 0 else last >> -k for k in range(octaves[0], top + 1)}
+        if max(self.powers.widths) > WIDEST or not self.relays[octaves[0]]:
             raise ValueError("a term is too wide")
 
     @property
@@ -281,6 +289,13 @@ class Design(Accelerated):
         return STEPS + self.powers.latency
 
     def params(self, words: Mapping[str, int]) -> tuple:
+        return self._common(words)
+
+    def float_params(self, gains: JerkGains | SnapGains, output: str, si: Mapping[str, float]) -> tuple:
+        return self._float_common(gains, si)
+
+    def _common(self, words: Mapping[str, int]) -> Params:
+        """Return the parameters that the integer kernels share."""
         (octaves,) = (words[word.name] for word in self.words)
         fractions = self.w.f, self.gap.f, *(each.f for each in self.z)
         limits = self.w.max, self.gap.max, *(each.max for each in self.z)
@@ -289,7 +304,8 @@ class Design(Accelerated):
             filtering=self.filtering,
             count_width=self.count_width,
             octaves=octaves,
-            relay=self.relays[octaves],
+            relays=np.array([*self.relays.values()], np.int64),
+            least_octave=min(self.relays),
             fractions=fractions,
             limits=limits,
             half=self.half,
@@ -298,7 +314,8 @@ class Design(Accelerated):
             powers=self.powers.params,
         )
 
-    def float_params(self, gains: JerkGains | SnapGains, output: str, si: Mapping[str, float]) -> tuple:
+    def _float_common(self, gains: JerkGains | SnapGains, si: Mapping[str, float]) -> FloatParams:
+        """Return the parameters that the float64 kernels share, with gains per sample."""
         ((_, bound),) = vars(gains).items()
         (word,) = self.words
         lipschitz = bound / self._per_l * 2.0 ** si.get(word.name, 0)
@@ -312,5 +329,5 @@ class Design(Accelerated):
             ),
         )
 
-    def start(self, floating: bool = False) -> State:
+    def start(self, floating: bool = False) -> tuple:
         return State(0, 0, 0.0, 0.0, 0.0, 0.0, 0.0) if floating else State(0, 0, 0, 0, 0, 0, 0)

@@ -33,6 +33,7 @@ ACCELERATED = [
     "levant-3-filtering",
     "levant-2-implicit",
     "levant-3-implicit",
+    "levant-adaptive",
 ]
 each = pytest.mark.parametrize("name", ACCELERATED)
 AXES = ("paper", "mhz", "narrow", "wide")

@@ -1,84 +1,83 @@
-"""Gains that adapt: RTL against model, model against exact integers, the law against what it promises."""
+"""A bound that follows the signal: RTL against model, the law against exact arithmetic, and what it is good for."""
 
 import itertools
 import math
+from collections.abc import Iterator
+from copy import copy
 from dataclasses import replace
-from random import Random
+from fractions import Fraction
 
-import levants
+import cocotb
 import numpy as np
 import pytest
+from levants import TURN_S, wrapped
 
 from hardwall.hdl.estimators.levant_adaptive import Estimator
+from hardwall.model.axis.axis import Axis
 from hardwall.model.encoder.quadrature import seen_count
-from hardwall.model.estimators import levant_adaptive
 from hardwall.model.estimators.estimate import estimate
-from hardwall.model.estimators.levant_adaptive import LOST, RAISED, START
+from hardwall.model.estimators.levant_adaptive import FALL, HOLD, LARGEST_L, LEVELS, LOST_BITS, Design, Gains, State
+from hardwall.model.estimators.levant_higher_design import LAMBDA
 from hardwall.model.runtime.compiled import compiled
-from hardwall.testing import rng, simulate
-from hardwall.testing.estimators import model, reset_words
-from stimuli.lengths import WHOLE, some_of
-from stimuli.papers_signal import BOUND, RATES, axis_at, swing
+from hardwall.model.spec import AxisSpec
+from hardwall.testing import CAMPAIGN, SAMPLES, parameters, simulate
+from hardwall.testing.estimators import follow
+from stimuli.lengths import some_of
+from stimuli.papers_signal import axis_at, swing
 from stimuli.seeded import seeded
 from stimuli.specs import spec
 
-NAME = "levant-adaptive"
+NAME = Design.name
+AXES = ("paper", "mhz", "narrow", "wide")
 COUNT_M = 1e-6
+LOST = 2**LOST_BITS
+BOUNDS = (1.68, 12.0, 28.5)
+"""C, m/s^2: of the paper's signal, of the paper's hit, and of the impact here."""
 
 
-def design(name: str) -> levant_adaptive.Design:
-    # Narrow words at times of a few samples: at those of the narrow axis, a campaign ends before the second level.
-    axis = replace(spec("narrow", NAME), acceleration_max_m_per_s2=12e3) if name == "brisk" else spec(name, NAME)
-    return axis.design.estimator
+def brisk(axis: str) -> AxisSpec:
+    """Return an axis with the largest bound that its rate allows: levels last as short as they can."""
+    of = spec(axis, NAME)
+    return replace(of, gains=Gains(LARGEST_L * of.count_m * float(of.sample_hz) ** 4))
 
 
-def make(name: str) -> Estimator:
-    return Estimator(design(name))
+def design(axis: str) -> Design:
+    """Return the design of a brisk axis, with holds so short that a campaign sees every level many times."""
+    d = copy(brisk(axis).design.estimator)
+    d.holds = 5 + np.arange(len(d.holds)) // 3
+    return d
 
 
-def stimulus(d: levant_adaptive.Design, samples: int):
-    """Yield the family's rows, then calm down to the last level, losses of all sizes from it, and a restart there."""
-    yield from levants.stimulus(d, samples * 2 // 5)
-    random, reset, count = seeded(), reset_words(d)[:2], 0
-    yield from losses(d, samples // 10, random)
-    most = max(samples // 20, 1)
-    for run in range(10):
-        # The first samples after a jump are for tracking, the rest for calm.
-        for k in range(most):
-            count += int(random.random() < 0.01) if run % 2 else 0
-            yield count, int(k == 0 and run == 4), *reset, k & 1
-        count += random.randrange(2, 4 ** (1 + run % 4)) * random.choice([-1, 1])
-        for _ in range(20):
-            count += run % 4
-            yield count, 0, *reset, 0
+def stimulus(d: Design, samples: int) -> Iterator[tuple[int, int, int]]:
+    """Yield rows of calm for a time up to that of all levels, then of losses of every size, with words and restarts."""
+    random, (word,), count, left = seeded(), d.words, 0, samples
+    half, calm = 1 << d.count_width - 1, sum(d.holds)
+    while left > 0:
+        octaves = random.choice((0, 0, word.low, word.high, random.randint(word.low, word.high)))
+        start, pace, time = count, random.choice((0.0, 0.0, 0.1)) * random.random(), random.randrange(calm)
+        for k in range(time):
+            count = start + math.floor(k * pace)
+            yield count, int(k == 0 and random.random() < 0.1), octaves
+        # A loss that stays, or comes and goes; some are far beyond a motion.
+        far = random.random() < 0.1
+        size, way = random.randrange(1, half if far else 1 << 11) >> random.randrange(11), random.choice((-1, 1))
+        moves = random.choice(((0,), (0, size, -size)))
+        for k in range(10):
+            count += way * (size if k == 0 else random.choice(moves))
+            yield count, int(far and k == 9), octaves
+        left -= time + 10
 
 
-def losses(d: levant_adaptive.Design, samples: int, random: Random):
-    """Yield rows of a calm of any time, a time on one side and a loss there; the level then says what it reached."""
-    leader, words = levants.Leader(d), reset_words(d)
-    calm, reach = sum(map(d.hold_samples, range(d.levels))), d.reach_samples(d.levels)
-    while samples > 0:
-        side = random.choice((-1, 1))
-        # Any time, or one beside that at which another level is reached.
-        beside = d.reach_samples(random.randint(1, d.levels)) + random.randint(-2, 2)
-        time = random.choice((max(beside, 1), 1 + random.randrange(reach + 10)))
-        # An error from 0 to a count is on the one side, and from -1 to 0 on the other.
-        parts = [
-            (int(side > 0), -side, random.choice((calm, random.randrange(calm + 20)))),
-            (int(side < 0), side, time),
-            (LOST << random.randrange(3), side, 3),
-        ]
-        for size, where, rows in parts:
-            yield from leader.rows(size, where, rows, words)
-            samples -= rows
+@cocotb.test(**CAMPAIGN)
+async def follows_model(dut):
+    component = Estimator(design(**parameters()))
+    d = component.design
+    await follow(dut, component, wrapped(d, stimulus(d, SAMPLES)), d.start())
 
 
-follows_model, reset_mid_stream_starts_afresh = levants.campaign(make, START, stimulus)
-
-
-@pytest.mark.parametrize("name", some_of(["paper", "brisk"], 0))
-def test_rtl(name):
-    simulate(__file__, make, name=name)
+@pytest.mark.parametrize("axis", some_of(AXES, 1))
+def test_rtl(axis):
+    simulate(__file__, lambda axis: Estimator(design(axis)), axis=axis)
 
 
 @compiled
@@ -90,224 +89,193 @@ def _visit(params, state, counts):
     return states
 
 
-def visit(d: levant_adaptive.Design, counts) -> list[levant_adaptive.State]:
+def visit(d: Design, counts: np.ndarray) -> list[State]:
     """Return the state after every count, with the words as after reset."""
-    return _visit(d.params({word.name: word.reset for word in d.words}), START, np.array(counts, np.int64))
+    params = d.params({word.name: word.reset for word in d.words})
+    return _visit(params, d.start(), counts)
 
 
-def test_the_campaign_sees_every_level():
+def test_a_campaign_sees_every_level_and_every_fall():
+    """On an axis whose distances have room for all doublings."""
     d = design("paper")
-    counts = [row[0] for row in stimulus(d, 100_000)]
-    levels = [state.level for state in visit(d, counts)]
-    assert set(levels) == set(range(-RAISED, d.levels + 1)) == set(range(-4, 13))
-    falls = {a - b for a, b in itertools.pairwise(levels) if b < a}
-    assert {1, 2, d.levels} <= falls
+    states = visit(d, np.array([row[0] for row in wrapped(d, stimulus(d, 12_500))], np.int64))
+    levels = [state.level for state in states]
+    assert set(levels) == set(range(LEVELS + 1))
+    assert {a - b for a, b in itertools.pairwise(levels) if b < a} == {1, 2, 3, FALL}
+    assert max(state.doublings for state in states) == math.ceil(LEVELS / FALL)
 
 
 class Law:
-    """The law as its module states it, from the whole history of signs and sizes since the start."""
+    """The law as its module states it, in rationals: a hold is compared by fourth powers, without a root."""
 
-    def __init__(self, d):
-        self.d, self.lost = d, LOST * 2**d.velocity.f
-        self.reach = [d.reach_samples(n) for n in range(1, d.levels + 1)]
-        self.start()
+    def __init__(self, lipschitz: float):
+        self._lipschitz = Fraction(lipschitz)
+        self.level = self._calm = self._lost = 0
 
-    def start(self):
-        self.level, self.calm, self.sizes, self.side, self.reached, self.doublings = 0, 0, [], 0, 0, 0
-
-    def level_after(self, b: int) -> int:
-        """Return the level after a displacement b, in LSBs of the velocity."""
-        sign = (b > 0) - (b < 0)
-        if sign and sign != self.side:
-            self.side, self.sizes, self.reached, self.doublings = sign, [], 0, 0
-        self.sizes.append(abs(b))
-        if self.reached < self.d.levels:
-            explained = sum(samples <= len(self.sizes) for samples in self.reach)
-            self.reached = min(self.reached + 1, explained)
-        if abs(b) >= self.lost * 2**self.doublings:
-            falls = {0: [], 1: [max(self.level - 2, 0)]}.get(self.doublings, [max(self.level - 2, -RAISED)])
-            self.level = min(self.level, self.reached, *falls)
-            self.doublings += 1
-        self.calm = self.calm + 1 if abs(b) < self.lost and self.level < self.d.levels else 0
-        if self.level < self.d.levels and self.calm >= self.d.hold_samples(self.level):
-            self.level, self.calm = self.level + 1, 0
+    def see(self, distance: Fraction, octaves: int) -> int:
+        """Return the level after a sample that is so far from its count."""
+        if distance < LOST:
+            self._calm, self._lost = self._calm + 1, 0
+            bound = self._lipschitz * Fraction(2) ** (octaves - self.level)
+            if self._calm**4 * bound >= HOLD**4:
+                self.level, self._calm = min(self.level + 1, LEVELS), 0
+        else:
+            self._calm = 0
+            if distance >= LOST * 2**self._lost and self.level:
+                self.level, self._lost = max(self.level - FALL, 0), self._lost + 1
         return self.level
 
 
-@pytest.mark.parametrize("name", ["paper", "mhz", "narrow", "brisk"])
-def test_model_is_the_exact_equation_rounded_as_documented(name):
-    d = design(name)
-    scale, one, unit, law = 2**d.root.f, 2**d.velocity.f, 2**d.lambda_.f, Law(d)
-
-    def step(lam, alpha, b, first):
-        if first:
-            law.start()
-        level = law.level_after(b)
-        # Powers of the level from the least on, which is even, are whole.
-        raised, halves = 2**RAISED, 2 ** (RAISED // 2)
-        near = min(abs(b), alpha * raised // 2 ** (level + RAISED))
-        beyond = abs(b) - near
-        twice_root = 2 * math.isqrt(beyond * scale**2 // (one * 2 ** (level % 2))) + 1
-        divisor = unit * 2 * scale * 2 ** ((level + RAISED) // 2)
-        return near, min(levants.half_up(lam * twice_root * one * halves, divisor), beyond)
-
-    rows = levants.wrapped(d, stimulus(d, 10_000 if WHOLE else 4000))
-    seen = model(d, rows, START)
-    for k, (velocity, flags) in enumerate(levants.oracle_run(d, rows, step)):
-        assert (velocity, flags) == (seen["velocity"][k], seen["saturated"][k]), f"sample {k}: {rows[k]}"
+def losses(hold: int, samples: int) -> np.ndarray:
+    """Return counts that jump by every size up to 300, and rest or move slowly in between, for up to 12 first holds."""
+    random, parts, count = seeded(), [np.zeros(1)], 0.0
+    while sum(map(len, parts)) < samples:
+        count += random.choice((-1, 1)) * 300 * random.random() ** 3
+        motion = count + random.choice((0.0, 0.0, 1 / hold)) * np.arange(random.randrange(1, 12 * hold))
+        parts.append(motion)
+        count = motion[-1]
+    return np.floor(np.concatenate(parts)).astype(np.int64)
 
 
+@pytest.mark.parametrize("axis", AXES)
+def test_the_law_is_the_documented_one_in_exact_arithmetic(axis):
+    d = brisk(axis).design.estimator
+    (word,) = d.words
+    counts = losses(d.holds[word.high], 100 * d.holds[word.high])
+    for octaves in sorted({word.low, 0, word.high}):
+        law, state, changes = Law(d.lipschitz), d.start(), 0
+        params = d.params({word.name: octaves})
+        for k, count in enumerate(counts.tolist()):
+            before = state
+            state, _, _ = estimate(params, before, seen_count(count), 0)
+            if k == 0:
+                continue
+            far = max(d.gap.min, min(d.gap.max, before.lead - ((count - before.count) << d.gap.f)))
+            # A negative distance is complemented: it is an LSB less.
+            size = Fraction(far if far >= 0 else -far - 1, 2**d.gap.f)
+            assert state.level == law.see(size, octaves), k
+            changes += state.level != before.level
+        assert changes > 20
+
+
+def test_the_float_kernel_is_the_published_algorithm_at_the_level_of_the_law():
+    """Sample by sample from the kernel's own state: near an error of 0 a root makes much of a rounding."""
+    axis = brisk("mhz")
+    d, n, levels = axis.design.estimator, 4, set()
+    counts, _ = swing(axis.sample_hz, 0.03, TURN_S)
+    counts = np.concatenate([counts, np.repeat(counts[-1], 10_000), np.repeat(counts[-1] + 40, 10_000)]) - counts[0]
+    params, law, after = Axis(axis, floating=True).params.estimator, Law(d.lipschitz), d.start(floating=True)
+    for k, count in enumerate(counts.tolist()):
+        state, (after, velocity, _) = after, estimate(params, after, seen_count(count), 0)
+        if k == 0:
+            continue
+        error, gap = state.w, state.lead - (count - state.count)
+        level = law.see(Fraction(abs(gap)), 0)
+        levels.add(level)
+        bound = d.lipschitz * 2.0**-level
+        # The published lines, with z0 as its distance from the count, and Taylor's terms.
+        s = [error, gap, state.z1, state.z2, state.z3]
+        further = [*s[1:], 0.0], [0.0, s[3] / 2, s[4] / 2, 0.0, 0.0]
+        moved = [sum(each) for each in zip(s, *further, strict=True)]
+        for j in range(n + 1):
+            power = abs(error) ** ((n - j) / 5) * bound ** ((j + 1) / 5)
+            moved[j] -= LAMBDA[4][n - j] * power * np.sign(error)
+        assert (after.w, after.lead, after.z1, after.z2, after.z3) == pytest.approx(moved, rel=1e-9, abs=1e-18)
+        assert (velocity, after.level) == (after.z1, level)
+    assert len(levels) > 10
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_every_level_and_word_has_its_hold_and_a_correction_that_moves_the_last_state(axis):
+    d = spec(axis, NAME).design.estimator
+    (word,) = d.words
+    for octaves, hold in zip(range(word.high, word.low - LEVELS - 1, -1), d.holds, strict=True):
+        bound = Fraction(d.lipschitz) * Fraction(2) ** octaves
+        assert (int(hold) - 1) ** 4 * bound < HOLD**4 <= int(hold) ** 4 * bound
+    assert min(d.relays.values()) >= 2**4
+
+
+def test_gains_that_no_word_holds_are_refused_with_the_range():
+    of = spec("mhz", NAME)
+    with pytest.raises(ValueError, match=r"^snap_m_per_s4 must be .* to .* at these rates, not 1e-30"):
+        assert replace(of, gains=type(of.design.gains)(1e-30)).design
+
+
+def rms(of: AxisSpec, counts: np.ndarray, truth: np.ndarray, first: int = 0, floating: bool = False) -> float:
+    """Return the RMS error, m/s, from sample `first` on."""
+    error = Axis(of, floating).run(counts).velocity_m_per_s - truth
+    return math.sqrt(np.mean(error[first:] ** 2))
+
+
+@pytest.mark.parametrize("bound", BOUNDS)
 @pytest.mark.parametrize("rate", [10_000, 100_000])
-def test_rounding_is_a_small_change_of_position(rate):
-    """Every u is the unrounded output for a `beyond` changed by no more than the derived eta."""
-    axis = axis_at(NAME, rate, 12.0)
-    d = axis.design.estimator
-    t = np.arange(20_000) / axis.sample_hz
-    counts = np.floor(0.01 / axis.count_m * np.sin(2 * np.pi * 4 * t)).astype(np.int64)
-    levels = [state.level for state in visit(d, counts)]
-    assert len(set(levels)) > 3
-    lead = START
-    params = d.params({word.name: word.reset for word in d.words})
-    for count, level in zip(counts.tolist(), levels, strict=True):
-        moved = count - lead.count if lead.running else 0
-        b = (lead.lead - (moved << d.velocity.f)) * d.velocity.lsb
-        lead, velocity, _ = estimate(params, lead, seen_count(count), 0)
-        lam = d.lambda_.to_real(d.words[0].reset) * 2.0 ** (-level / 2)
-        near = min(abs(b), math.floor(d.words[1].reset * 2.0**-level) * d.velocity.lsb)
-        beyond, g = abs(b) - near, math.copysign(1, b) * (lead.u1 - velocity) * d.velocity.lsb
-        # At odd levels the root is taken of half the radicand.
-        delta = lam * 2.0 ** -(d.root.f + 1) * math.sqrt(1 + level % 2) + 2.0 ** -(d.velocity.f + 1)
-        eta = abs(max((g / lam) ** 2, g) - beyond)
-        assert eta <= max(2 * math.sqrt(beyond) * delta / lam + (delta / lam) ** 2, delta) + 1e-9
+def test_word_length_costs_little(rate, bound):
+    """A rounding moves a loss, so single runs differ either way: over sixteen, RMS is within three hundredths."""
+    of, squares = axis_at(NAME, rate, bound), np.zeros(2)
+    for phase in np.arange(16) / 16:
+        counts, truth = swing(rate, 2.0, TURN_S, phase)
+        for way, floating in enumerate((True, False)):
+            squares[way] += rms(of, counts, truth, rate // 2, floating) ** 2
+    exact, fixed = np.sqrt(squares)
+    assert abs(fixed - exact) <= 0.03 * exact
 
 
-@pytest.mark.parametrize("bound", [BOUND, 12.0])
-@pytest.mark.parametrize(("rate", "runs"), [*zip(RATES, (200, 200, 40, 8, 2), strict=True)])
-def test_word_length_costs_a_hundredth_at_every_rate(rate, runs, bound):
-    """Errors are RMS over many runs: a rounding that tips a loss changes a run by 2 to 8 % either way below 1 MHz."""
-    exact, fixed = levants.rms_errors(axis_at(NAME, rate, bound), 0.4, runs)["u"]
-    assert abs(fixed - exact) <= 0.01 * exact
-
-
-@pytest.mark.parametrize("acceleration", [0.1, -1.0, 10.0])
-@pytest.mark.parametrize("rate", [10_000, 100_000])
-def test_a_step_of_acceleration_after_rest_is_seen_within_the_derived_error_and_time(rate, acceleration):
-    """The error is sqrt(2 (LOST + 1) A q) and the time sqrt(2 (LOST + 1) q / A), each plus a sample.
-
-    At the sample that detects the step, lambda_j's step may exceed the error.
-    """
-    axis_spec = axis_at(NAME, rate, 12.0)
-    d, tau, steep = axis_spec.design.estimator, 1 / rate, abs(acceleration)
-    error = math.sqrt(2 * (LOST + 1) * steep * COUNT_M) + steep * tau
-    latest = math.sqrt(2 * (LOST + 1) * COUNT_M / steep) + tau
-    for phase in rng().random(3):
-        t = np.arange(-rate, round(2 * latest * rate)) * tau
-        truth = acceleration * np.maximum(t, 0)
-        counts = np.floor(truth * np.maximum(t, 0) / 2 / COUNT_M + phase).astype(np.int64)
-        levels = np.array([state.level for state in visit(d, counts)])
-        assert levels[rate] == d.levels
-        seen = rate + int(np.argmax(levels[rate:] < d.levels))
-        assert 0 < t[seen] <= latest
-        velocity = levants.axis(axis_spec).run(counts).velocity_m_per_s
-        assert np.abs(velocity - truth)[rate:seen].max() <= error
-        overshoot = math.sqrt((LOST + 1) * 12.0 * 2.0 ** -levels[seen] * COUNT_M)
-        assert abs(velocity[seen] - truth[seen]) <= max(error, overshoot)
-
-
-def rms(name: str, rate: int, bound: float, counts: np.ndarray, truth: np.ndarray, first: int = 0) -> float:
-    """Return the RMS error of u, m/s, from sample `first` on."""
-    velocity = levants.axis(axis_at(name, rate, bound)).run(counts).velocity_m_per_s
-    return math.sqrt(np.mean((velocity - truth)[first:] ** 2))
-
-
-def test_a_bound_seven_times_too_large_costs_nothing():
-    counts, truth = swing(100_000, 1.0, levants.TURN_S)
-    fixed_gains = {bound: rms("levant", 100_000, bound, counts, truth) for bound in (BOUND, 12.0)}
-    adapted = rms(NAME, 100_000, 12.0, counts, truth)
-    assert adapted < fixed_gains[BOUND] < fixed_gains[12.0] / 2
-
-
-@pytest.mark.parametrize("speed", [1e-4, 1e-3, 1e-2])
-def test_slow_constant_speeds_are_ten_times_quieter(speed):
-    rate = 100_000
-    counts = np.floor(speed * np.arange(2 * rate) / rate / COUNT_M + 0.3).astype(np.int64)
-    assert rms(NAME, rate, 12.0, counts, speed, rate) < rms("levant", rate, 12.0, counts, speed, rate) / 10
-
-
-def test_a_hit_is_followed():
-    """A hit of 0.35 kg at 0.3 m/s into 10 kN/m, then rest: no worse than gains made for it, and quieter afterwards."""
-    rate, speed, omega = 100_000, 0.3, math.sqrt(10e3 / 0.35)
-    t = np.arange(round(0.6 * rate)) / rate - 0.3
-    braking = np.clip(t, 0, np.pi / 2 / omega)
-    counts = np.floor((speed * np.minimum(t, 0) + speed / omega * np.sin(omega * braking)) / COUNT_M).astype(np.int64)
-    truth = np.where(t < 0, speed, np.where(braking < t, 0.0, speed * np.cos(omega * braking)))
-    hit = slice(round(0.25 * rate), round(0.4 * rate))
-    assert rms(NAME, rate, 55.0, counts[: hit.stop], truth[: hit.stop], hit.start) < rms(
-        "levant", rate, 55.0, counts[: hit.stop], truth[: hit.stop], hit.start
-    )
-    assert rms(NAME, rate, 55.0, counts, truth, round(0.5 * rate)) == 0
-
-
-def impact(rate: int, acceleration: float, speed: float, late: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return (times, velocities): a constant speed that a wall brakes as a quarter of a sine; it begins by 0.1 s."""
+def impact(rate: int, acceleration: float, speed: float, phase: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return (counts, velocities, m/s): a rest, a speed that a wall brakes as a quarter of a sine, and a rest."""
     omega = acceleration / speed
-    t = np.arange(round(0.2 * rate)) / rate - 0.1 + late / rate
+    t = np.arange(round(0.7 * rate)) / rate - 0.4
     braked = np.clip(t, 0, np.pi / 2 / omega)
-    truth = np.where(t < 0, speed, speed * np.cos(omega * braked))
-    return speed * np.minimum(t, 0) + speed / omega * np.sin(omega * braked), np.where(omega * t > np.pi / 2, 0, truth)
+    path = np.where(t < 0, speed * t, speed / omega * np.sin(omega * braked))
+    truth = np.where(t < 0, speed, np.where(omega * t > np.pi / 2, 0.0, speed * np.cos(omega * braked)))
+    return np.floor(path / COUNT_M + phase).astype(np.int64), truth
 
 
-@pytest.mark.parametrize("acceleration", [24.0, 51.0])
-@pytest.mark.parametrize("rate", [100_000, 500_000])
-def test_an_impact_beyond_the_axis_s_acceleration_is_caught_within_the_derived_error(rate, acceleration):
-    """With C = 12 the raised level -2 is enough, so |b| is at most twice the error that leads there."""
-    axis_spec, random = axis_at(NAME, rate, 12.0), rng()
-    at = LOST * 2**2
-    before = math.sqrt(2 * (at + 1) * acceleration * COUNT_M)
-    after = math.sqrt(2**RAISED * 12.0 * (2 * at + 1) * COUNT_M)
-    speeds = [0.3, *10 ** random.uniform(-2, -0.2, 20)]
-    largest = []
-    for speed in speeds:
-        path, truth = impact(rate, acceleration, speed, random.random())
-        counts = np.floor(path / COUNT_M + random.random()).astype(np.int64)
-        error = levants.axis(axis_spec).run(counts).velocity_m_per_s - truth
-        largest.append(np.abs(error[round(0.09 * rate) :]).max())
-    assert max(largest) <= max(before, after) + acceleration / rate
+@pytest.mark.parametrize("rate", [100_000, 1_000_000])
+def test_one_setting_serves_swing_and_impact(rate):
+    """On either it is better than the fixed bound that serves both best, which is found by trial."""
+    ours, fixed = axis_at(NAME, rate, 28.5), axis_at("levant-3-filtering", rate, 28.5)
+    moves = swing(rate, 2.0, TURN_S, 0.3), impact(rate, 28.5, 0.3, 0.3)
+    of_swing, of_impact = (rms(ours, *move, len(move[0]) // 2) for move in moves)
+    kind = fixed.design.estimator.gains_class
+    for snap in np.geomspace(1e4, 1e11, 15):
+        of = replace(fixed, gains=kind(min(snap, kind.largest * COUNT_M * float(rate) ** 4)))
+        assert of_swing < rms(of, *moves[0], rate) or of_impact < rms(of, *moves[1], len(moves[1][0]) // 2) / 3
 
 
-def test_levels_below_that_of_the_axis_are_left_after_a_calm():
-    d = design("mhz")
-    jump = [0] * 10 + [LOST << 5] * 20
-    levels = [state.level for state in visit(d, [*jump, *jump[-1:] * 5 * d.hold_samples(0)])]
-    raised = max(k for k, level in enumerate(levels) if level == -RAISED)
-    assert levels[raised:].index(0) <= 2 * d.hold_samples(0)
+@pytest.mark.parametrize("rate", [100_000, 1_000_000])
+def test_a_bound_on_the_acceleration_that_is_far_too_small_costs_little(rate):
+    counts, truth = impact(rate, 51.0, 0.3, 0.6)
+    told = [rms(axis_at(NAME, rate, bound), counts, truth, len(counts) // 2) for bound in (51.0, 3.0)]
+    assert told[1] < 2 * told[0]
 
 
-@pytest.mark.parametrize(
-    ("gains", "named"),
-    [
-        ({"lambda_sqrt_m_per_s": 1e-12, "alpha_m_per_s2": 4.9e5}, "alpha_m_per_s2"),
-        ({"lambda_sqrt_m_per_s": 600.0, "alpha_m_per_s2": 1e-8}, "lambda_sqrt_m_per_s"),
-    ],
-)
-def test_gains_that_raised_fit_no_word_are_refused(gains, named):
-    with pytest.raises(ValueError, match=f"^{named} must be at most .* at these rates, not"):
-        levant_adaptive.Design(spec("narrow", NAME), levant_adaptive.Gains(**gains))
+@pytest.mark.parametrize("speed", [1e-4, 1e-3, 1e-2, 0.1])
+def test_slow_constant_speeds_are_ten_times_quieter_than_at_level_0(speed):
+    rate = 100_000
+    counts = np.floor(speed * np.arange(4 * rate) / rate / COUNT_M + 0.3).astype(np.int64)
+    fixed = axis_at("levant-3-filtering", rate, 12.0)
+    gains = fixed.design.estimator.gains_class(axis_at(NAME, rate, 12.0).design.gains.snap_m_per_s4 / 16)
+    level_4 = replace(fixed, gains=gains)
+    assert rms(axis_at(NAME, rate, 12.0), counts, speed, 3 * rate) < rms(level_4, counts, speed, 3 * rate) / 10
 
 
-def test_the_counters_of_the_law_are_bounded():
-    for name in ("paper", "narrow"):
-        d = design(name)
-        rows = levants.wrapped(d, stimulus(d, 20_000))
-        for state in visit(d, [row[0] for row in rows]):
-            assert -RAISED <= state.level <= d.levels
-            assert 0 <= state.reached <= d.levels
-            assert 0 <= state.elapsed <= d.reach_samples(d.levels)
-            assert 0 <= state.calm < max(d.hold_samples(d.levels - 1), 1)
-            assert LOST <= state.limit <= 2 ** (d.error.i + 1)
+@pytest.mark.parametrize("rate", [10_000, 100_000])
+def test_a_standstill_is_read_as_one(rate):
+    counts, _ = swing(rate, 0.5, TURN_S, 0.2)
+    rest = np.full(2 * rate, counts[-1])
+    record = Axis(axis_at(NAME, rate, 12.0)).run(np.concatenate([counts, rest]))
+    assert np.abs(record.velocity_m_per_s[-rate // 2 :]).max() < 1e-4
 
 
-def test_fewer_levels_where_words_or_strokes_are_short():
-    narrow = axis_at(NAME, 10_000_000)
-    assert 0 < narrow.design.estimator.levels < levant_adaptive.LEVELS
-    assert narrow.design.estimator.velocity.f <= 60 - narrow.count_width
+@pytest.mark.parametrize("speed", [0.1, 0.2, 0.5])
+def test_a_start_in_motion_settles_as_fast_as_level_0(speed):
+    """In 3.6 times tau of the largest L, the documented time, and with what a loss costs on the way."""
+    rate = 1_000_000
+    of = axis_at(NAME, rate, 12.0)
+    bound = of.design.gains.snap_m_per_s4
+    tau = (speed / bound) ** (1 / 3)
+    counts = np.floor(speed * np.arange(round(20 * tau * rate)) / rate / COUNT_M).astype(np.int64)
+    error = np.abs(Axis(of).run(counts).velocity_m_per_s - speed)
+    ripple = 4 * (COUNT_M**3 * bound) ** (1 / 4)
+    settled = np.flatnonzero(error > 0.005 * speed + ripple)[-1] / rate
+    assert settled <= 3.7 * tau

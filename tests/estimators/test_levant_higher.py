@@ -11,15 +11,16 @@ import numpy as np
 import pytest
 from levants import TURN_S, wrapped
 
-from hardwall.hdl.estimators.levant_higher import Estimator
+from hardwall.hdl.estimators.registry import block_of
 from hardwall.model.arithmetic.fixed import SQ
 from hardwall.model.arithmetic.powers import MANTISSA_BITS, STEPS
 from hardwall.model.axis.axis import Axis
 from hardwall.model.encoder.quadrature import seen_count
 from hardwall.model.estimators.acceleration import acceleration_of
 from hardwall.model.estimators.estimate import estimate
+from hardwall.model.estimators.levant_adaptive import Design as Adaptive
 from hardwall.model.estimators.levant_higher import Filtering2, Filtering3, Order2, Order3
-from hardwall.model.estimators.levant_higher_design import LAMBDA, Design, State
+from hardwall.model.estimators.levant_higher_design import LAMBDA, Design
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
 from hardwall.testing.estimators import follow, model
@@ -28,7 +29,8 @@ from stimuli.papers_signal import axis_at, swing
 from stimuli.seeded import seeded
 from stimuli.specs import spec
 
-NAMES = [each.name for each in (Order2, Order3, Filtering2, Filtering3)]
+FIXED = [each.name for each in (Order2, Order3, Filtering2, Filtering3)]
+NAMES = [*FIXED, Adaptive.name]
 TIGHT = "tight"
 """The axis `paper` with a shorter acceleration and jerk: derived formats hold them before they hold the velocity."""
 
@@ -36,9 +38,9 @@ TIGHT = "tight"
 LIMIT = "limit"
 """An axis of so large a jerk that L is `LARGEST_L`, and no word raises it."""
 AXES = ["paper", "mhz", "narrow", TIGHT, LIMIT]
-every = pytest.mark.parametrize("name", NAMES)
+every = pytest.mark.parametrize("name", FIXED)
+every_law = pytest.mark.parametrize("name", NAMES)
 every_form = pytest.mark.parametrize("name", [*NAMES, "levant-2-implicit", "levant-3-implicit"])
-START = State(0, 0, 0, 0, 0, 0, 0)
 
 
 def limited(name: str) -> AxisSpec:
@@ -79,9 +81,9 @@ def stimulus(d: Design, samples: int) -> Iterator[tuple[int, int, int]]:
 
 @cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
-    component = Estimator(design(**parameters()))
+    component = block_of(design(**parameters()))
     d = component.design
-    expected = await follow(dut, component, wrapped(d, stimulus(d, max(SAMPLES, 20_000))), START)
+    expected = await follow(dut, component, wrapped(d, stimulus(d, max(SAMPLES, 20_000))), d.start())
     assert 0 in expected["saturated"]
     if parameters()["axis"] == TIGHT:
         assert np.bitwise_or.reduce(expected["saturated"]) == 0b111
@@ -89,7 +91,7 @@ async def follows_model(dut):
 
 @cocotb.test()
 async def reset_mid_stream_starts_afresh(dut):
-    component = Estimator(design(**parameters()))
+    component = block_of(design(**parameters()))
     bench = Bench(dut, component)
     await bench.reset()
     word = {component.design.words[0].name: 0}
@@ -104,7 +106,7 @@ async def reset_mid_stream_starts_afresh(dut):
 
 @pytest.mark.parametrize(("name", "axis"), some_of([(name, axis) for name in NAMES for axis in AXES], 1, 8, 12, 18, 19))
 def test_rtl(name, axis):
-    simulate(__file__, lambda name, axis: Estimator(design(name, axis)), name=name, axis=axis)
+    simulate(__file__, lambda name, axis: block_of(design(name, axis)), name=name, axis=axis)
 
 
 def half_up(value: Fraction) -> int:
@@ -140,7 +142,7 @@ def integer_root(value: int, degree: int) -> int:
     return low
 
 
-@every
+@every_law
 @pytest.mark.parametrize("axis", ["mhz", "narrow", LIMIT])
 def test_every_step_is_the_published_one_in_exact_arithmetic(name, axis):
     """Taylor's series is exact but for documented rounding; every correction is the formula's within the table's error.
@@ -149,7 +151,7 @@ def test_every_step_is_the_published_one_in_exact_arithmetic(name, axis):
     """
     d, (word,) = design(name, axis), design(name, axis).words
     rows = [*stimulus(d, 6000)]
-    state, position, last, corrected = START, 0, None, 0
+    state, position, last, corrected = d.start(), 0, None, 0
     modulus, half = 2**d.count_width, 2 ** (d.count_width - 1)
     f = [d.gap.f, *(each.f for each in d.z)]
     for count, restart, octaves in wrapped(d, rows):
@@ -159,7 +161,7 @@ def test_every_step_is_the_published_one_in_exact_arithmetic(name, axis):
         state, velocity, flags = estimate(params, before, seen_count(count), restart)
         bent = Fraction(state.z2) * Fraction(2) ** (d.acceleration.f - f[2])
         assert acceleration_of(params, state) == math.floor(bent)
-        if before is START or restart:
+        if not before.running or restart:
             assert (velocity, flags, state.lead, state.w, state.z2, state.z3) == (0, 0, 0, 0, 0, 0)
             continue
         far = before.lead - moved * 2**d.gap.f
@@ -181,7 +183,8 @@ def test_every_step_is_the_published_one_in_exact_arithmetic(name, axis):
             formats.insert(0, d.w)
         away = (error < 0) - (error > 0)
         size = abs(error) if error >= 0 else abs(error) - Fraction(1, 2 ** (d.w if d.filtering else d.gap).f)
-        ranges = [*exactly(d, octaves, size), (d.relays[octaves],) * 2]
+        raised = octaves - getattr(state, "level", 0)
+        ranges = [*exactly(d, raised, size), (d.relays[raised],) * 2]
         for total, now, fmt, (least, most) in zip(taylor, after, formats, ranges, strict=True):
             if fmt in d.z[1:] and flags & 0b010:
                 # It would go on pushing the velocity, which is at its end.
@@ -222,7 +225,7 @@ def test_the_float_kernel_is_the_published_algorithm(name):
         assert run.velocity[k] == pytest.approx(s[d.filtering + 1], rel=1e-6, abs=1e-9), k
 
 
-@every
+@every_law
 @pytest.mark.parametrize("axis", ["paper", "mhz"])
 def test_no_stop_start_or_reversal_of_the_axis_saturates(name, axis):
     """With every word: from rest to the largest speed at once, to the other direction at once, and to rest."""
@@ -242,7 +245,7 @@ def test_no_stop_start_or_reversal_of_the_axis_saturates(name, axis):
             assert abs(end - speeds[(part + 1) * hold - 1]) <= 0.02 * speed + 8 / tau
 
 
-@every
+@every_law
 def test_a_saturation_is_left_again(name):
     """A jump by half of the count's range, which no motion makes: flagged, and forgotten."""
     of = spec("mhz", name)
@@ -274,7 +277,7 @@ def test_word_length_and_rough_terms_cost_a_hundredth(name, rate):
 @every_form
 def test_every_flag_is_raised_by_something(name):
     d = design(name, TIGHT)
-    assert np.bitwise_or.reduce(model(d, wrapped(d, stimulus(d, 20_000)), START)["saturated"]) == 0b111
+    assert np.bitwise_or.reduce(model(d, wrapped(d, stimulus(d, 20_000)), d.start())["saturated"]) == 0b111
 
 
 @every_form
@@ -286,8 +289,6 @@ def test_wrap_and_restart(name):
     expected = Axis(of).run(counts).velocity
     assert expected.any()
     assert (Axis(of).run(counts + half - counts[0] - 1000).velocity == expected).all()
-    word = {d.words[0].name: 0}
     rows = [(count, int(k == 700), 0) for k, count in enumerate(counts.tolist())]
-    again = model(d, rows[700:], START)["velocity"]
-    assert (model(d, rows, START)["velocity"][700:] == again).all()
-    assert d.params(word).octaves == 0
+    again = model(d, rows[700:], d.start())["velocity"]
+    assert (model(d, rows, d.start())["velocity"][700:] == again).all()

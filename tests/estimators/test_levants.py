@@ -13,22 +13,21 @@ from hardwall.testing import rng
 from stimuli.papers_signal import BOUND, RATES, axis_at, swing
 from stimuli.specs import spec
 
-FIXED_GAINS = ("levant", "levant-semi-implicit", "levant-implicit")
-PROJECTING = FIXED_GAINS[1:]
-ADAPTIVE = "levant-adaptive"
+NAMES = ("levant", "levant-semi-implicit", "levant-implicit")
+PROJECTING = NAMES[1:]
 
 
 @pytest.mark.parametrize("output", ["u", "u1"])
 @pytest.mark.parametrize("bound", [BOUND, 12.0])
 @pytest.mark.parametrize("rate", RATES)
-@pytest.mark.parametrize("name", FIXED_GAINS)
+@pytest.mark.parametrize("name", NAMES)
 def test_word_length_costs_a_hundredth_at_every_rate(name, rate, bound, output):
     exact, fixed = levants.rms_errors(axis_at(name, rate, bound), 0.4, runs=4)[output]
     assert abs(fixed - exact) <= 0.01 * exact
 
 
 @pytest.mark.parametrize("floating", [False, True])
-@pytest.mark.parametrize("name", [*FIXED_GAINS, ADAPTIVE])
+@pytest.mark.parametrize("name", NAMES)
 def test_u1_is_what_the_state_keeps_of_either_kernel(name, floating):
     axis_spec, (counts, _) = axis_at(name, 10_000), swing(10_000, 0.1, levants.TURN_S)
     params, state, kept = Axis(axis_spec, floating).params.estimator, axis_spec.design.start(floating).estimator, []
@@ -40,14 +39,14 @@ def test_u1_is_what_the_state_keeps_of_either_kernel(name, floating):
 
 
 @pytest.mark.parametrize(("gains", "named"), levants.REFUSED)
-@pytest.mark.parametrize("name", [*FIXED_GAINS, ADAPTIVE])
+@pytest.mark.parametrize("name", NAMES)
 def test_gains_that_cannot_be_held_are_refused(name, gains, named):
     design = registry.design_of(name)
     with pytest.raises(ValueError, match=f"^{named}"):
         design(spec("paper", name), design.gains_class(**gains))
 
 
-@pytest.mark.parametrize("name", [*FIXED_GAINS, ADAPTIVE])
+@pytest.mark.parametrize("name", NAMES)
 def test_wrong_design_is_refused(name):
     with pytest.raises(TypeError, match=r"not 3$"):
         ESTIMATORS[name](3)
@@ -59,7 +58,7 @@ def test_in_the_band_it_is_the_finite_difference(name):
 
 
 @pytest.mark.parametrize("rate", RATES[:4])
-@pytest.mark.parametrize("name", [*PROJECTING, ADAPTIVE])
+@pytest.mark.parametrize("name", PROJECTING)
 def test_a_count_that_stands_is_zero(name, rate):
     levants.check_standstill(name, rate)
 
@@ -74,7 +73,7 @@ def test_at_1_khz_the_chatter_is_gone(name):
     assert ours <= difference < explicit / 4
 
 
-@pytest.mark.parametrize("name", [*PROJECTING, ADAPTIVE])
+@pytest.mark.parametrize("name", PROJECTING)
 def test_wrap_restart_and_drift(name):
     levants.check_wrap_and_restart(axis_at(name, 10_000))
     levants.check_no_drift(axis_at(name, 1_000_000, 12.0))

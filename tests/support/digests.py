@@ -42,7 +42,7 @@ OUTPUTS = {
     "levant-edge": ("u",),
     "levant-semi-implicit": ("u", "u1"),
     "levant-implicit": ("u", "u1"),
-    "levant-adaptive": ("u", "u1"),
+    "levant-adaptive": ("z1",),
     "window": ("u",),
     "foaw": ("end-fit", "best-fit"),
     "edge-kalman": ("u",),

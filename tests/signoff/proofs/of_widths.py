@@ -25,6 +25,7 @@ from hardwall.hdl.estimators import (
     finite_difference,
     kalman,
     levant,
+    levant_adaptive,
     levant_edge,
     levant_higher,
     levant_semi_implicit,
@@ -184,7 +185,12 @@ CASES = {
     ),
     "levant-semi-implicit": Case(partial(estimator, "levant-semi-implicit"), ROOTED, PRODUCT, ranges.levants),
     "levant-implicit": Case(partial(estimator, "levant-implicit"), ROOTED, PRODUCT, ranges.levants),
-    "levant-adaptive": Case(partial(estimator, "levant-adaptive"), ROOTED, PRODUCT, ranges.adaptive),
+    "levant-adaptive": Case(
+        partial(estimator, "levant-adaptive"),
+        (*MOVED, *OF_ZERO),
+        Bug(levant_adaptive.Estimator._octaves, "Mux(level < FALL, 0, level - FALL)", "level - FALL"),
+        ranges.adaptive,
+    ),
     **{
         name: Case(
             partial(estimator, name),

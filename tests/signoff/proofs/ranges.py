@@ -1,6 +1,6 @@
 """What registers hold, which induction needs to know: promised, and proven with the widths of the block."""
 
-from amaranth.hdl import Cat, Mux
+from amaranth.hdl import Cat, Mux, Value
 from amaranth.lib import wiring
 
 from hardwall.hdl.axis.output import Output
@@ -11,7 +11,7 @@ from hardwall.model.arithmetic.divisionless import digits
 from hardwall.model.encoder.quadrature import START
 from hardwall.model.estimators.edge_kalman_design import Design
 from hardwall.model.estimators.foaw import TAPS
-from hardwall.model.estimators.levant_adaptive import RAISED
+from hardwall.model.estimators.levant_adaptive import FALL, LEVELS
 
 from .bench import Bench
 from .of_arithmetic import root_keeps
@@ -56,22 +56,35 @@ def levant_alone(bench: Bench, block: wiring.Component) -> None:
 
 def levant_higher(bench: Bench, block: wiring.Component) -> None:
     """Assume that the octaves are within the range of their word and stay; promise the octave of what is no zero."""
-    (word,), powers = block.design.words, block.design.powers
+    of_powers(bench, block, held_word(bench, block))
+
+
+def adaptive(bench: Bench, block: wiring.Component) -> None:
+    """Assume and promise this, too; promise that the law stays in its range, and a level is left for every doubling."""
+    held_word(bench, block)
+    (word,), last, inner = block.design.words, int(max(block.design.holds)) - 1, bench.inner
+    of_powers(bench, block, bench.past(inner["raised"]))
+    bench.within(level=(0, LEVELS), raised=(word.low - LEVELS, word.high), full=(0, last))
+    bench.promise(inner["calm"] <= inner["full"])
+    bench.promise((inner["calm"] == 0) | (inner["full"] == inner["hold"]))
+    bench.promise(inner["level"] + FALL * inner["doublings"] <= LEVELS + FALL - 1)
+
+
+def held_word(bench: Bench, block: wiring.Component) -> Value:
+    """Assume that the octaves are within the range of their word and stay; return them."""
+    (word,) = block.design.words
     octaves, stays = port(block, word.name), bench.constant(word.format.width)
     bench.assume((octaves >= word.low) & (octaves <= word.high) & (octaves == stays.as_signed()))
+    return octaves
+
+
+def of_powers(bench: Bench, block: wiring.Component, octaves: Value) -> None:
+    """Promise the octave of what is no zero, for the octaves of the clock in which it was found."""
+    powers = block.design.powers
     size, octave, taken = bench.past(bench.inner["size"], 2), bench.inner["powers.octave"], bench.inner["powers.run"][1]
     for place in range(len(size)):
         leads = size[place:] == 1
         bench.promise(~taken | ~leads | (octave == place + powers.params.offset - octaves))
-
-
-def adaptive(bench: Bench, block: wiring.Component) -> None:
-    """Promise that the counters of the law stop before their next threshold, too."""
-    levants(bench, block)
-    levels, inner = block.design.levels, bench.inner
-    bench.within(reached=(0, levels), _level=(0, RAISED + levels), calm=(0, block.design.hold_samples(levels - 1) - 1))
-    for level in range(levels):
-        bench.promise((inner["reached"] != level) | (inner["elapsed"] < block.design.reach_samples(level + 1)))
 
 
 def past(bench: Bench, block: wiring.Component) -> None:
