@@ -13,7 +13,8 @@ from . import levant_higher
 class Estimator(levant_higher.Estimator):
     """A differentiator of order 3 with filtering that lowers L while it follows, one sample at a time.
 
-    Equation: as of `levant_higher`, with L 2**-level for L. With d = |z0 - count| of this sample, in counts:
+    Equation: as of `levant_higher`, with L 2**-level for L. A sample with d = |z0 - count| counts gives the next one
+    a level by this law:
 
         d >= LOST 2**doublings    level falls by FALL, at most to 0; one doubling more
         d >= LOST                 level stays
@@ -23,8 +24,7 @@ class Estimator(levant_higher.Estimator):
 
     Start: at the first sample, and with `restart`, z0 = count and all else is 0.
 
-    Latency: `latency` clocks from `strobe` to `valid`, as of `levant_higher`: the level is ready while the powers'
-    leading one is sought. The next `strobe` may come with `valid`.
+    Latency: `latency` clocks from `strobe` to `valid`, as of `levant_higher`. The next `strobe` may come with `valid`.
 
     Rounding and overflow: as of `levant_higher`; no count of the law overflows.
 
@@ -46,6 +46,7 @@ class Estimator(levant_higher.Estimator):
         calm = Signal(range(max(holds)))
         doublings = Signal(range(-(-LEVELS // FALL) + 1))
         raised = Signal(shape(design.powers.octave_format))
+        m.d.comb += raised.eq(word - level)
 
         # The last sample of a hold has the number of its samples less one. The table is read before a sample comes.
         full, ahead = Signal.like(calm), Signal(range(len(holds)))
@@ -69,5 +70,5 @@ class Estimator(levant_higher.Estimator):
         with m.If(begin):
             m.d.comb += after.eq(0)
             m.d.sync += [calm.eq(0), doublings.eq(0)]
-        m.d.sync += [level.eq(after), raised.eq(word - after)]
+        m.d.sync += level.eq(after)
         return raised

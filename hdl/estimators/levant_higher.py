@@ -29,8 +29,9 @@ class Estimator(AcceleratedBlock):
     The velocity is z1, the acceleration z2. Start: at the first sample, and with `restart`, z0 = count and all else is
     0.
 
-    Latency: `latency` clocks from `strobe` to `valid`: one for the distance from the count, one for the magnitude of
-    e, the powers' own, one for the sums. The next `strobe` may come with `valid`.
+    Latency: `latency` clocks from `strobe` to `valid`. Without filtering: one for the distance from the count, one for
+    the magnitude of e, the powers' own, one for the sums. With filtering, e is known before the strobe: the powers
+    begin with it, and the first two clocks are theirs, too. The next `strobe` may come with `valid`.
 
     Rounding and overflow: the powers are rough, as derived; Taylor's terms and the velocity round half up, the
     acceleration rounds down; saturations are flagged. The count may wrap.
@@ -68,20 +69,25 @@ class Estimator(AcceleratedBlock):
             self.velocity.eq(z[0] >> design.z[0].f - design.velocity.f),
             self.acceleration.eq(shift_floor(z[1], design.z[1].f - design.acceleration.f)),
         ]
-        m.d.sync += [self.valid.eq(0), powers.start.eq(0)]
+        near = fitted(led, design.gap.width)
+        error = w if design.filtering else near
+        size = (error ^ error[-1].replicate(len(error)))[:-2]
+        if design.filtering:
+            m.d.comb += [powers.size.eq(size), powers.start.eq(self.strobe)]
+        else:
+            m.d.sync += [powers.size.eq(size), powers.start.eq(0)]
+        m.d.sync += self.valid.eq(0)
         with m.FSM():
             first = arrive(m, self, led, lead, design.gap.f, "MAGNITUDE")
             with m.State("MAGNITUDE"):
-                near = fitted(led, design.gap.width)
-                error = w if design.filtering else near
                 m.d.sync += [
                     gap.eq(near),
                     over.eq(~fits(led, design.gap.width)),
-                    powers.size.eq((error ^ error[-1].replicate(len(error)))[:-2]),
                     negative.eq(error[-1]),
                     still.eq(error == 0),
-                    powers.start.eq(1),
                 ]
+                if not design.filtering:
+                    m.d.sync += powers.start.eq(1)
                 m.next = "POWERS"
             with m.State("POWERS"), m.If(powers.done):
                 far = [_moved(total, term, ~negative) for total, term in zip(sums, corrections, strict=True)]
@@ -98,13 +104,14 @@ class Estimator(AcceleratedBlock):
                     self.valid.eq(1),
                 ]
                 m.next = "SAMPLE"
-        m.d.comb += powers.octaves.eq(self._octaves(m, powers.start & ~first, powers.start & first, gap))
+        m.d.comb += powers.octaves.eq(self._octaves(m, powers.done & ~first, powers.done & first, gap))
         return m
 
     def _octaves(self, m: Module, judge: Value, begin: Value, gap: Signal) -> Value:
-        """Return by how many octaves L is raised. The form that adapts has them from the clock after these pulses on.
+        """Return by how many octaves L is raised.
 
-        `judge` is high for one clock with the distance `gap` of a sample, `begin` with the distance of the first one.
+        `judge` is high in the last clock of a sample, with its distance `gap`; `begin` in the last clock of the first
+        one. What a form that adapts makes of it is for the next sample.
         """
         return port(self, self.design.words[0].name)
 
@@ -147,10 +154,11 @@ class Estimator(AcceleratedBlock):
         return shift_round_half_up(z[1], self.design.z[1].f - self.design.z[0].f + 1)
 
     def _relay(self, m: Module, octaves: Signal) -> Signal:
-        """Return the correction of the last state, in a register."""
+        """Return the correction of the last state, in a register, two clocks after the octaves."""
         least, most = self.design.powers.octaves
-        relay = Signal((self.design.relays[most]).bit_length())
-        with m.Switch(octaves):
+        relay, taken = Signal((self.design.relays[most]).bit_length()), Signal.like(octaves)
+        m.d.sync += taken.eq(octaves)
+        with m.Switch(taken):
             for k in range(least, most + 1):
                 with m.Case(k):
                     m.d.sync += relay.eq(self.design.relays[k])

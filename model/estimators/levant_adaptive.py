@@ -1,8 +1,8 @@
 """Levant's differentiator of order 3 with filtering, whose bound L follows the signal, in fixed point and in float64.
 
 `levant_higher_design` has the equation. Its gains follow from L, a bound on the snap. Here L has levels: at level j it
-is the largest L times 2**-j. A low L reads a smooth motion with little noise, a high one follows an impact. After every
-sample the distance from the count, |z0 - f|, decides:
+is the largest L times 2**-j. A low L reads a smooth motion with little noise, a high one follows an impact. The
+distance of a sample from the count, |z0 - f|, decides on the level of the next sample:
 
 1. *Lost*. At LOST counts L is too low: the count alone is off by half a count at most, and a poor encoder adds its
    errors. The level falls by FALL, and falls again each time the distance has doubled. FALL octaves of L halve the
@@ -172,7 +172,7 @@ def step(params, state, seen, restart):
     far_gap, gap = distance(family, state, seen)
     size = ~gap if gap < 0 else gap
     adapted = adapt(params.law, state, size >> family.fractions[1] + LOST_BITS)
-    moved, velocity, flags = advance(family, state, far_gap, gap, family.octaves - adapted[0])
+    moved, velocity, flags = advance(family, state, far_gap, gap, family.octaves - state.level)
     return State(1, seen.count, *moved, *adapted), velocity, flags
 
 
@@ -185,7 +185,7 @@ def float_step(params, state, seen, restart):
         return State(1, seen.count, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0, 0), 0.0, 0
     gap = state.lead - wrap(seen.count - state.count, family.count_width)
     adapted = adapt(params.law, state, int(abs(gap)) >> LOST_BITS)
-    moved = float_advance(family, state, gap, 2.0 ** (-adapted[0] / 5))
+    moved = float_advance(family, state, gap, 2.0 ** (-state.level / 5))
     return State(1, seen.count, *moved, *adapted), moved[2], 0
 
 

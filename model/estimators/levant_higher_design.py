@@ -102,6 +102,8 @@ WIDEST = 60
 """The most bits of a state: sums of them fit int64."""
 STEPS = 3
 """Clocks of the sequence besides the powers: see `hardwall.hdl.estimators.levant_higher`."""
+FILTERING_STEPS = 1
+"""The same with filtering, where the powers begin with the strobe: their error is known before it."""
 
 
 @dataclass(frozen=True)
@@ -286,7 +288,7 @@ class Design(Accelerated):
 
     @property
     def latency(self) -> int:
-        return STEPS + self.powers.latency
+        return (FILTERING_STEPS if self.filtering else STEPS) + self.powers.latency
 
     def params(self, words: Mapping[str, int]) -> tuple:
         return self._common(words)
