@@ -15,9 +15,8 @@ LEAVES = {
     "axes": (Box(430, 14, 250, 58), "levant", "output u1", ""),
     "mt": (Box(20, 378, 100, 78), "mt", "few cells", ""),
     "edges": (Box(140, 378, 200, 78), "edge-kalman", "learns how well edges", "are in their places"),
-    "fewest": (Box(372, 378, 84, 78), "window", "fewest cells", ""),
-    "fewer": (Box(464, 378, 82, 78), "kalman", "fewer cells", ""),
-    "counts": (Box(554, 378, 126, 78), "count-kalman", "short samples,", "no bursts"),
+    "fewest": (Box(372, 378, 110, 78), "window", "fewest cells", ""),
+    "counts": (Box(502, 378, 178, 78), "levant-adaptive", "finds the bound", "of the motion by itself"),
 }
 """Where the questions and the estimators are, and their words."""
 BUS = 332
@@ -71,9 +70,8 @@ def _left(sheet: Sheet) -> None:
 def _right(sheet: Sheet) -> None:
     """Draw the answers where there are only counts."""
     counts = QUESTIONS["counts"][0]
-    _down(sheet, "fewer", 396, counts, LEAVES["fewest"][0])
-    _down(sheet, "kalman only", 478, counts, LEAVES["fewer"][0])
-    _down(sheet, "count-kalman", 574, counts, LEAVES["counts"][0])
+    _down(sheet, "fewer", 400, counts, LEAVES["fewest"][0])
+    _down(sheet, "for levant-adaptive", 530, counts, LEAVES["counts"][0])
 
 
 def _down(sheet: Sheet, said: str, x: float, above: Box, below: Box) -> None:

@@ -2,7 +2,7 @@
 
 from amaranth.hdl import Array, Module, Mux, Signal, Value
 
-from hardwall.model.estimators.levant_adaptive import FALL, LEVELS, LOST_BITS, Design
+from hardwall.model.estimators.levant_adaptive import FALL, LEVELS, Design
 
 from ..arithmetic.fixed import shape
 from ..arithmetic.powers import entry_of
@@ -16,9 +16,10 @@ class Estimator(levant_higher.Estimator):
     Equation: as of `levant_higher`, with L 2**-level for L. A sample with d = |z0 - count| counts gives the next one
     a level by this law:
 
+        d < LOST                  no doublings; after HOLD T samples of this, level rises by 1
+        d < 2 LOST, level < FALL  the same
         d >= LOST 2**doublings    level falls by FALL, at most to 0; one doubling more
-        d >= LOST                 level stays
-        otherwise                 no doublings; after HOLD T samples of this, level rises by 1
+        otherwise                 level stays
 
     `hardwall.model.estimators.levant_adaptive` says why.
 
@@ -45,21 +46,21 @@ class Estimator(levant_higher.Estimator):
         level, lower, after = (Signal(range(LEVELS + 1), name=name) for name in ("level", "lower", "level_after"))
         calm = Signal(range(max(holds)))
         doublings = Signal(range(-(-LEVELS // FALL) + 1))
-        raised = Signal(shape(design.powers.octave_format))
-        m.d.comb += raised.eq(word - level)
+        octaves = Signal(shape(design.powers.octave_format))
+        m.d.comb += octaves.eq(word - level)
 
         # The last sample of a hold has the number of its samples less one. The table is read before a sample comes.
-        full, ahead = Signal.like(calm), Signal(range(len(holds)))
+        longest, ahead = Signal.like(calm), Signal(range(len(holds)))
         m.d.comb += ahead.eq(design.words[0].high - word + level)
-        m.d.sync += full.eq(entry_of(m, ahead, [samples - 1 for samples in holds], "hold"))
+        m.d.sync += longest.eq(entry_of(m, ahead, [samples - 1 for samples in holds], "hold"))
 
         # The distance in multiples of LOST; a negative one is complemented.
-        far = (gap ^ gap[-1].replicate(len(gap)))[design.gap.f + LOST_BITS : -1]
+        far = (gap ^ gap[-1].replicate(len(gap)))[design.gap.f + design.lost_bits : -1]
         lost = Array([far[doubled:].any() for doubled in range(1 << len(doublings))])[doublings]
-        held, last = calm >= full, level == LEVELS
+        held, last = calm >= longest, level == LEVELS
         m.d.comb += [lower.eq(Mux(level < FALL, 0, level - FALL)), after.eq(level)]
         with m.If(judge):
-            with m.If(~far.any()):
+            with m.If(~Mux(level < FALL, far[1:], far).any()):
                 m.d.sync += [calm.eq(Mux(last | held, 0, calm + 1)), doublings.eq(0)]
                 m.d.comb += after.eq(Mux(held & ~last, level + 1, level))
             with m.Else():
@@ -69,6 +70,6 @@ class Estimator(levant_higher.Estimator):
                     m.d.sync += doublings.eq(doublings + 1)
         with m.If(begin):
             m.d.comb += after.eq(0)
-            m.d.sync += [calm.eq(0), doublings.eq(0)]
+            m.d.sync += calm.eq(0)
         m.d.sync += level.eq(after)
-        return raised
+        return octaves

@@ -49,7 +49,7 @@ this is 1.96 u0 / alpha. It holds for the largest step, too (0.3 m/s with C = 12
 the largest speed nothing saturates after that transient. At standstill u and u1 never come to rest but chatter by
 lambda sqrt(alpha tau^2) and alpha tau; `levant_semi_implicit` comes to rest.
 
-`levant_semi_implicit`, `levant_implicit` and `levant_adaptive` share this module's gains, design and helper functions.
+`levant_semi_implicit` and `levant_implicit` share this module's gains, design and helper functions.
 """
 
 import math

@@ -182,6 +182,7 @@ class Design(Accelerated):
         filtering: 1 with filtering, else 0.
         ahead: samples of a reversal by which `gap` is larger than the peak of z0 - f.
         levels: octaves by which the form that adapts may lower L.
+        noise: what an error of the count makes beside a motion, as NOISE.
 
     Attributes:
         lipschitz: the designed L, counts a sample^(order + 1).
@@ -204,6 +205,7 @@ class Design(Accelerated):
     powers: Any
     ahead: ClassVar[float] = 0.0
     levels: ClassVar[int] = 0
+    noise: float = NOISE
 
     def __init__(self, axis: AxisRequirements, gains: JerkGains | SnapGains):
         super().__init__(axis, gains)
@@ -214,7 +216,8 @@ class Design(Accelerated):
             most = round(math.log2(largest))
             least = next((n for n in range(LEAST_OCTAVE, most + 1) if self._fit(axis, 2.0**n)), None)
             if least is None:
-                raise FieldError("estimator", f"{self.name} has no words for the largest speed at this rate")
+                short = " with so many bits dropped" if axis.estimator_bits_dropped else ""
+                raise FieldError("estimator", f"{self.name} has no words for the largest speed at this rate{short}")
             raise FieldError(
                 field, f"must be {2.0**least * per_l:g} to {largest * per_l:g} at these rates, not {bound!r}"
             )
@@ -255,14 +258,14 @@ class Design(Accelerated):
                 raise ValueError("a state is too wide")
             return SQ(i, f)
 
-        gap = state((peaks[1] * tau_low + self.ahead) * step + NOISE, 1 / own)
+        gap = state((peaks[1] * tau_low + self.ahead) * step + self.noise, 1 / own)
         if axis.count_width + 1 + gap.f > WIDEST:
             raise ValueError("a count is too wide")
         self.gap = gap
-        self.w = state(peaks[0] * step * tau_low**2 + NOISE * slowest, 1.0) if self.filtering else SQ(1, 0)
-        z = [state(max(step * peaks[2], 1.0) + NOISE / fastest, own**-2)]
+        self.w = state(peaks[0] * step * tau_low**2 + self.noise * slowest, 1.0) if self.filtering else SQ(1, 0)
+        z = [state(max(step * peaks[2], 1.0) + self.noise / fastest, own**-2)]
         for n in range(2, order + 1):
-            peak = peaks[n + 1] * step * tau_high ** (1 - n) + NOISE * fastest**-n
+            peak = peaks[n + 1] * step * tau_high ** (1 - n) + self.noise * fastest**-n
             z.append(state(peak, own ** -(n + 1)))
         self.z = tuple(z) + (SQ(1, 0),) * (3 - order)
 

@@ -11,12 +11,13 @@ import cocotb
 import numpy as np
 import pytest
 from levants import TURN_S, wrapped
+from test_levant_higher import stimulus as motions
 
 from hardwall.hdl.estimators.levant_adaptive import Estimator
 from hardwall.model.axis.axis import Axis
 from hardwall.model.encoder.quadrature import seen_count
 from hardwall.model.estimators.estimate import estimate
-from hardwall.model.estimators.levant_adaptive import FALL, HOLD, LARGEST_L, LEVELS, LOST_BITS, Design, Gains, State
+from hardwall.model.estimators.levant_adaptive import FALL, HOLD, LARGEST_L, LEVELS, Design, Gains, State
 from hardwall.model.estimators.levant_higher_design import LAMBDA
 from hardwall.model.runtime.compiled import compiled
 from hardwall.model.spec import AxisSpec
@@ -30,7 +31,6 @@ from stimuli.specs import spec
 NAME = Design.name
 AXES = ("paper", "mhz", "narrow", "wide")
 COUNT_M = 1e-6
-LOST = 2**LOST_BITS
 BOUNDS = (1.68, 12.0, 28.5)
 """C, m/s^2: of the paper's signal, of the paper's hit, and of the impact here."""
 
@@ -49,8 +49,9 @@ def design(axis: str) -> Design:
 
 
 def stimulus(d: Design, samples: int) -> Iterator[tuple[int, int, int]]:
-    """Yield rows of calm for a time up to that of all levels, then of losses of every size, with words and restarts."""
-    random, (word,), count, left = seeded(), d.words, 0, samples
+    """Yield the rows of every order, then calm for a time up to that of all levels, and losses of every size."""
+    yield from motions(d, samples // 2)
+    random, (word,), count, left = seeded(), d.words, 0, samples // 2
     half, calm = 1 << d.count_width - 1, sum(d.holds)
     while left > 0:
         octaves = random.choice((0, 0, word.low, word.high, random.randint(word.low, word.high)))
@@ -106,23 +107,29 @@ def test_a_campaign_sees_every_level_and_every_fall():
 
 
 class Law:
-    """The law as its module states it, in rationals: a hold is compared by fourth powers, without a root."""
+    """The law as the pages state it, in rationals: a hold is compared by fourth powers, without a root.
+
+    Its figures are those of the pages: two counts, four levels, 64 T, 26 levels.
+    """
 
     def __init__(self, lipschitz: float):
         self._lipschitz = Fraction(lipschitz)
+        self.start()
+
+    def start(self) -> None:
         self.level = self._calm = self._lost = 0
 
     def see(self, distance: Fraction, octaves: int) -> int:
         """Return the level after a sample that is so far from its count."""
-        if distance < LOST:
+        if distance < 2 or (self.level < 4 and distance < 4):
             self._calm, self._lost = self._calm + 1, 0
             bound = self._lipschitz * Fraction(2) ** (octaves - self.level)
-            if self._calm**4 * bound >= HOLD**4:
-                self.level, self._calm = min(self.level + 1, LEVELS), 0
+            if self._calm**4 * bound >= 64**4:
+                self.level, self._calm = min(self.level + 1, 25), 0
         else:
             self._calm = 0
-            if distance >= LOST * 2**self._lost and self.level:
-                self.level, self._lost = max(self.level - FALL, 0), self._lost + 1
+            if distance >= 2 * 2**self._lost and self.level:
+                self.level, self._lost = max(self.level - 4, 0), self._lost + 1
         return self.level
 
 
@@ -139,23 +146,40 @@ def losses(hold: int, samples: int) -> np.ndarray:
 
 @pytest.mark.parametrize("axis", AXES)
 def test_the_law_is_the_documented_one_in_exact_arithmetic(axis):
-    d = brisk(axis).design.estimator
-    (word,) = d.words
+    d, random = brisk(axis).design.estimator, seeded()
+    (word,), half = d.words, 1 << d.count_width - 1
     counts = losses(d.holds[word.high], 100 * d.holds[word.high])
     for octaves in sorted({word.low, 0, word.high}):
         law, state, changes = Law(d.lipschitz), d.start(), 0
         params = d.params({word.name: octaves})
         for k, count in enumerate(counts.tolist()):
-            before = state
-            state, _, _ = estimate(params, before, seen_count(count), 0)
-            if k == 0:
+            before, restart = state, int(random.random() < 1e-4)
+            state, _, _ = estimate(params, before, seen_count(count), restart)
+            if k == 0 or restart:
+                law.start()
                 continue
-            far = max(d.gap.min, min(d.gap.max, before.lead - ((count - before.count) << d.gap.f)))
+            moved = (count - before.count + half) % (2 * half) - half
+            far = max(d.gap.min, min(d.gap.max, before.lead - (moved << d.gap.f)))
             # A negative distance is complemented: it is an LSB less.
             size = Fraction(far if far >= 0 else -far - 1, 2**d.gap.f)
             assert state.level == law.see(size, octaves), k
             changes += state.level != before.level
         assert changes > 20
+
+
+@pytest.mark.parametrize("side", [0, 1])
+@pytest.mark.parametrize(("told", "lost"), [(0.01, 2), (0.1, 2), (0.11, 4), (0.5, 4), (1e6, 4)])
+def test_a_loss_is_at_its_counts_and_not_an_lsb_below(told, lost, side):
+    d = replace(spec("mhz", NAME), edge_error_max_counts=told).design.estimator
+    law = d.params({word.name: 0 for word in d.words}).law
+    for size, far in ((lost, 1), (2 * lost, 2)):
+        least = size << d.gap.f
+        for distance in (least - 1, least):
+            lead = ~distance if side else distance
+            state = d.start()._replace(running=1, lead=lead, level=9, doublings=far - 1)
+            after, _, _ = estimate(d.params({word.name: 0 for word in d.words}), state, seen_count(0), 0)
+            assert after.level == (5 if distance == least else 9)
+    assert law.lost_bits == lost.bit_length() - 1
 
 
 def test_the_float_kernel_is_the_published_algorithm_at_the_level_of_the_law():
@@ -186,7 +210,9 @@ def test_the_float_kernel_is_the_published_algorithm_at_the_level_of_the_law():
 
 @pytest.mark.parametrize("axis", AXES)
 def test_every_level_and_word_has_its_hold_and_a_correction_that_moves_the_last_state(axis):
-    d = spec(axis, NAME).design.estimator
+    of = replace(spec(axis, NAME), gains=None)
+    d, steepest = of.design.estimator, 32 * of.acceleration_max_m_per_s2**2 / of.count_m
+    assert of.design.gains.snap_m_per_s4 == min(steepest, 2**-7 * of.count_m * float(of.sample_hz) ** 4)
     (word,) = d.words
     for octaves, hold in zip(range(word.high, word.low - LEVELS - 1, -1), d.holds, strict=True):
         bound = Fraction(d.lipschitz) * Fraction(2) ** octaves
@@ -249,7 +275,7 @@ def test_a_bound_on_the_acceleration_that_is_far_too_small_costs_little(rate):
 
 
 @pytest.mark.parametrize("speed", [1e-4, 1e-3, 1e-2, 0.1])
-def test_slow_constant_speeds_are_ten_times_quieter_than_at_level_0(speed):
+def test_slow_constant_speeds_are_ten_times_quieter_than_at_level_4(speed):
     rate = 100_000
     counts = np.floor(speed * np.arange(4 * rate) / rate / COUNT_M + 0.3).astype(np.int64)
     fixed = axis_at("levant-3-filtering", rate, 12.0)
@@ -278,3 +304,32 @@ def test_a_start_in_motion_settles_as_fast_as_level_0(speed):
     ripple = 4 * (COUNT_M**3 * bound) ** (1 / 4)
     settled = np.flatnonzero(error > 0.005 * speed + ripple)[-1] / rate
     assert settled <= 3.7 * tau
+
+
+def flicker(period: int, duty: float, samples: int) -> np.ndarray:
+    """Return counts of a motion that stops at once on an edge, where the count then comes and goes."""
+    rest = np.arange(samples) % period < period * duty
+    return np.concatenate([5 * np.arange(300), 1500 + rest])
+
+
+@pytest.mark.parametrize("axis", [brisk("mhz"), axis_at(NAME, 1_000, 12.0), axis_at(NAME, 10_000, 12.0)], ids=str)
+def test_a_count_that_flickers_holds_no_level_for_ever(axis):
+    """With the largest bound that a rate allows, whose chatter is the largest."""
+    d = axis.design.estimator
+    assert d.lipschitz == LARGEST_L
+    samples = 60 * int(d.holds[d.words[0].high])
+    for period in (*range(2, 24), 40, 100):
+        for duty in (0.2, 0.5, 0.8):
+            states = visit(d, flicker(period, duty, samples).astype(np.int64))
+            assert min(state.level for state in states[-samples // 4 :]) >= 2 * FALL
+
+
+@pytest.mark.parametrize("error", [0.1, 0.25, 0.5])
+def test_edges_that_err_as_much_as_the_axis_says_hold_no_level_for_ever(error):
+    axis = replace(axis_at(NAME, 10_000, 12.0), edge_error_max_counts=error)
+    d, random, samples = axis.design.estimator, np.random.default_rng(1), 20_000
+    for speed in np.linspace(0.02, 1.5, 12):
+        places = np.arange(int(speed * samples) + 3) + error * random.standard_normal(int(speed * samples) + 3)
+        motion = np.searchsorted(np.sort(places), speed * np.arange(samples))
+        states = visit(d, np.concatenate([5 * np.arange(300), 1500 + motion]))
+        assert min(state.level for state in states[-samples // 4 :]) >= 2 * FALL

@@ -63,10 +63,8 @@ def adaptive(bench: Bench, block: wiring.Component) -> None:
     """Assume and promise this, too; promise that the law stays in its range, and a level is left for every doubling."""
     held_word(bench, block)
     (word,), last, inner = block.design.words, int(max(block.design.holds)) - 1, bench.inner
-    of_powers(bench, block, bench.past(inner["raised"]))
-    bench.within(level=(0, LEVELS), raised=(word.low - LEVELS, word.high), full=(0, last))
-    bench.promise(inner["calm"] <= inner["full"])
-    bench.promise((inner["calm"] == 0) | (inner["full"] == inner["hold"]))
+    of_powers(bench, block, bench.past(inner["octaves"]))
+    bench.within(level=(0, LEVELS), octaves=(word.low - LEVELS, word.high), longest=(0, last), calm=(0, last))
     bench.promise(inner["level"] + FALL * inner["doublings"] <= LEVELS + FALL - 1)
 
 
