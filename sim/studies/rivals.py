@@ -22,7 +22,7 @@ from .choose import EDGE_ERROR_COUNTS, PHASE_ERROR_COUNTS
 MOTIONS = {"swing": "paper", "impact": "hit", "dither": "flicker", "rest": "stop", "creep": "steady:1.037"}
 """Names of signals, by what tables call the motions: the paper's signal, a hit of a wall, a hand that trembles about an
 edge, a handle that has stopped, and about 1 mm/s."""
-OURS = ("kalman", "levant-3-filtering", "count-kalman", "edge-kalman", "levant-edge")
+OURS = ("kalman", "levant-adaptive", "count-kalman", "edge-kalman", "levant-edge")
 REAL = {"encoder.edge_error_counts": EDGE_ERROR_COUNTS, "encoder.phase_error_counts": PHASE_ERROR_COUNTS}
 """The errors of the encoder that is called real, unless others are given."""
 USUAL, BEST, OWN = "usual", "best", "default"

@@ -55,7 +55,7 @@ def test_this_projects_estimators_have_one_set_of_bounds(made):
     assert {json.dumps(job["bounds"]) for job in own} == {json.dumps(own[0]["bounds"])}
     assert own[0]["bounds"]["acceleration_max_m_per_s2"] == pytest.approx(28.5, abs=0.1)
     assert all((job["gains"] is None) == (job["estimator"] != LOOP) for job in own)
-    assert {job["output"] for job in own if job["estimator"] == "levant-3-filtering"} == {"z1"}
+    assert {job["output"] for job in own if job["estimator"] == "levant-adaptive"} == {"z1"}
 
 
 def test_a_rival_has_its_usual_settings_and_the_best_of_each_place(made):
