@@ -33,7 +33,10 @@ SEEN = (
     "a_channel_idle", "drive_inverted",
 )  # fmt: skip
 """Ports of the axis inside that the models are fed with or held to."""
-
+RUNNING = "alive", "outputs_enable"
+"""Pins beside those of the drive."""
+AT_PIN = "pin_"
+"""How the name of a pin begins among the ports inside, which may have the same name."""
 
 RECORDS = 16
 """Records of the capture memory: a host reads as many in a few samples."""
@@ -69,7 +72,7 @@ class Watched(wiring.Component):
     Attributes:
         board: the board.
         asked: how the inputs of the axis and the capture memory that come from the link lie in `asking`.
-        shown: how `SEEN` lies in `showing`.
+        shown: how `SEEN`, and the pins of drive and `RUNNING`, lie in `showing`.
     """
 
     def __init__(self, board: Board):
@@ -77,7 +80,9 @@ class Watched(wiring.Component):
         asked = (each.name for each in (*registers.words, *registers.live, *registers.pulses))
         theirs = {name: board.axis if name in board.axis.signature.members else board.capture for name in asked}
         self._asked = {name: getattr(block, name) for name, block in theirs.items()}
+        pins = *board.spec.drive.pins, *RUNNING
         self._shown = {name: getattr(board.axis, name) for name in SEEN}
+        self._shown |= {AT_PIN + name: getattr(board, name) for name in pins}
         self.asked, self.shown = (
             Packing({name: Shape.cast(port.shape()) for name, port in ports.items()})
             for ports in (self._asked, self._shown)
@@ -155,9 +160,11 @@ class Twin(AxisTwin):
         if asked["commit"]:
             self.asked = {name: asked[name] for name in self.words if name in asked}
 
-    def levels(self, permitted: int) -> tuple[int, ...]:
-        """Return the levels of the stage's pins."""
-        return tuple(self.stage.pins(self.spec.drive, self.staged, permitted).values())
+    def pins(self, permitted: int) -> dict[str, int]:
+        """Return the levels of the pins of a board whose clock runs, by name."""
+        stage = self.stage.pins(self.spec.drive, self.staged, permitted)
+        alive = self.follower.supervisor.alive
+        return {AT_PIN + name: level for name, level in (*stage.items(), *zip(RUNNING, (alive, 1), strict=True))}
 
     def _capture(self, asked: dict[str, int], sampled: int) -> None:
         """Advance the capture memory by one clock edge."""

@@ -155,7 +155,7 @@ endmodule
 """Adds squares of words, each long after its start. What holds the word matters in that time; the first clear never."""
 
 
-@pytest.mark.parametrize(("number", "equal"), [(1, True), (2, True), (3, False), (4, False)])
+@pytest.mark.parametrize(("number", "equal"), some_of([(1, True), (2, True), (3, False), (4, False)], 1, 2))
 def test_what_differs_where_no_state_reads_it_is_equivalent(number, equal):
     known = known_of(Netlist(Answer(), SUM, (BLOCK,), [Mutant(number, "planted")]), [number])
     assert (known[number] == EQUIVALENT) == equal
@@ -180,7 +180,7 @@ differs if that is read an odd number of clocks after it is written, or perhaps 
 
 @pytest.mark.parametrize(
     ("read", "skips", "equal"),
-    [(3, 0, True), (7, 0, True), (7, 1, False), (2, 0, False), (6, 0, False), (1, 0, False)],
+    some_of([(3, 0, True), (7, 0, True), (7, 1, False), (2, 0, False), (6, 0, False), (1, 0, False)], 1, 2, 5),
 )
 def test_what_is_inverted_where_no_state_reads_it_is_equal_by_states(read, skips, equal, tmp_path):
     verilog = TURNS.replace("READ = 5, SKIPS = 0", f"READ = {read}, SKIPS = {skips}")
