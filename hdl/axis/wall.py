@@ -22,10 +22,11 @@ def split(value: Value) -> list[Value]:
 def products(name: str, gain: Value, operand: Value) -> tuple[list, Value]:
     """Return the assignments that take the products of a gain and the parts of an operand, and the registers' sum.
 
-    Nothing but a register is behind a multiplier: what adds the parts has a clock of its own.
+    Nothing but a register is behind a multiplier: what adds the parts has a clock of its own. It has no reset, like the
+    register inside a multiplier of the iCE40, which then takes its place.
     """
     made = [gain * part for part in split(operand)]
-    taken = [Signal(each.shape(), name=f"{name}_{place}") for place, each in enumerate(made)]
+    taken = [Signal(each.shape(), name=f"{name}_{place}", reset_less=True) for place, each in enumerate(made)]
     whole = sum(each << place * PART_BITS for place, each in enumerate(taken))
     return [register.eq(each) for register, each in zip(taken, made, strict=True)], whole
 

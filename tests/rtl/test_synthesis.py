@@ -113,23 +113,68 @@ def test_the_clock_is_that_of_the_pin(clocks, found):
     step = {"delay": 4.0, "from": {"cell": "board.axis.u_DFFRE_Q_3"}, "to": {"cell": "board.axis.v_ALU_SUM_2"}}
     paths = [{"from": f"posedge {name}", "to": f"posedge {name}", "path": [step]} for name in clocks]
     fmax = {name: {"achieved": 100.0 * (1 + (name == clocks[found]))} for name in clocks}
-    assert timing.timing(PARTS["gw1nr-9"], {"fmax": fmax, "critical_paths": paths}) == (5.0, "axis.u to axis.v")
+    assert timing.timing(PARTS["gw1nr-9"], {"fmax": fmax, "critical_paths": paths}, {}) == (5.0, "axis.u to axis.v")
+
+
+def multiplier(takers: str = "SB_DFFE", port: str = "D", **parameters: str) -> dict[str, dict]:
+    """Return a netlist of a multiplier: registers give it two bits, and of its output 0 and 16 are taken."""
+    output = {"O": [*range(10, 42)], "A": [1, *"0" * 15], "B": [2, *"0" * 15]}
+    return {
+        "in": {"type": "SB_DFF", "parameters": {}, "connections": {"Q": [1], "D": [2]}},
+        "made": {"type": "SB_MAC16", "parameters": parameters, "connections": output},
+        "low": {"type": takers, "parameters": {}, "connections": {port: [10], "Q": [50]}},
+        "high": {"type": takers, "parameters": {}, "connections": {port: [26], "Q": [51]}},
+    }
+
+
+BEHIND = {"TOPOUTPUT_SELECT": "01", "BOTOUTPUT_SELECT": "01"}
+"""Of a multiplier with a register behind it."""
 
 
 @pytest.mark.parametrize(
-    ("parameters", "half"),
+    ("netlist", "untimed"),
     [
-        ({}, False),
-        ({"TOPOUTPUT_SELECT": "11", "BOTOUTPUT_SELECT": "11"}, False),
-        ({"A_REG": "1", "B_REG": "1", "TOPOUTPUT_SELECT": "01"}, False),
-        ({"A_REG": "1", "B_REG": "1", "TOPOUTPUT_SELECT": "11"}, True),
-        ({"A_REG": "1", "B_REG": "0", "TOPOUTPUT_SELECT": "01"}, True),
-        ({"PIPELINE_16x16_MULT_REG2": "1"}, True),
+        ({"a": {"type": "SB_LUT4", "parameters": {}, "connections": {"O": [3]}}}, False),
+        (multiplier(TOPOUTPUT_SELECT="11", BOTOUTPUT_SELECT="11"), False),
+        (multiplier("SB_LUT4", "I0", TOPOUTPUT_SELECT="11", BOTOUTPUT_SELECT="11"), False),
+        (multiplier("SB_LUT4", "I0", **BEHIND), False),
+        (multiplier(TOPOUTPUT_SELECT="11", BOTOUTPUT_SELECT="01"), False),
+        (multiplier(TOPOUTPUT_SELECT="01", BOTOUTPUT_SELECT="11"), False),
+        (multiplier(port="E", TOPOUTPUT_SELECT="11", BOTOUTPUT_SELECT="01"), True),
+        (multiplier("SB_LUT4", "I0", TOPOUTPUT_SELECT="11", BOTOUTPUT_SELECT="01"), True),
+        (multiplier("SB_LUT4", "I0", TOPOUTPUT_SELECT="01", BOTOUTPUT_SELECT="11"), True),
+        (multiplier(A_REG="1", B_REG="1", **BEHIND), True),
+        (multiplier(A_REG="1"), True),
+        (multiplier(PIPELINE_16x16_MULT_REG2="1"), True),
     ],
 )
-def test_multipliers_with_registers_on_one_side_are_seen(parameters, half):
-    cells = {"a": {"type": "SB_LUT4", "parameters": {}}, "b": {"type": "SB_MAC16", "parameters": parameters}}
-    assert timing.half_registered(cells) is half
+def test_multipliers_whose_delay_is_not_known_are_seen(netlist, untimed):
+    assert timing.untimed(netlist) is untimed
+
+
+def test_a_multiplier_with_a_register_behind_it_is_part_of_a_path():
+    """The path is the latest way into the multiplier, through it, and from what is not in its register to the next."""
+    part = PARTS["ice40-up5k"]
+
+    def net(driver: str, cell: str, port: str, *delay: float) -> dict:
+        return {"driver": driver, "endpoints": [{"cell": cell, "port": port, "delay": delay}]}
+
+    nets = [
+        net("in_LC", "made_DSP", "A_0", 3.0, 6.0),
+        net("other_LC", "made_DSP", "B_15", 5.0),
+        net("other_LC", "made_DSP", "OHOLDTOP", 30.0),
+        net("in_LC", "low_LC", "I0", 40.0),
+        net("made_DSP", "low_LC", "I0", 1.0),
+        net("made_DSP", "high_LC", "I0", 2.0),
+    ]
+    step = {"delay": 10.0, "from": {"cell": "u_SB_DFF_Q"}, "to": {"cell": "v_SB_DFF_D"}}
+    paths = [{"from": "posedge clk", "to": "posedge clk", "path": [step]}]
+    report = {"fmax": {"clk": {"achieved": 100.0}}, "critical_paths": paths, "detailed_net_timings": nets}
+    assert timing.timing(part, report, multiplier(**BEHIND)) == (6.0 + part.multiplier_ns + 2.0, "through a multiplier")
+    # Without a register it is in the paths of a clock of its own.
+    assert timing.timing(part, report, multiplier()) == (10.0, "u to v")
+    report["fmax"]["clk"]["achieved"] = 50.0
+    assert timing.timing(part, report, multiplier(**BEHIND)) == (20.0, "u to v")
 
 
 def test_a_clock_that_is_missed_is_a_result(calls):

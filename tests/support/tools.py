@@ -20,7 +20,7 @@ if seed in (13, 17, 19):
     sys.exit(1)
 if not seed:
     cells = ["TRELLIS_FF"] * 3 + ["LUT4"] * 4 + ["SB_DFFESR"] * 5 + ["SB_DFF"] + ["DFFRE"] * 2 + ["MULT9X9"]
-    netlist = {{str(k): {{"type": kind, "parameters": {{}}}} for k, kind in enumerate(cells)}}
+    netlist = {{str(k): {{"type": kind, "parameters": {{}}, "connections": {{}}}} for k, kind in enumerate(cells)}}
     pathlib.Path("top.json").write_text(json.dumps({{"modules": {{"top": {{"cells": netlist}}}}}}))
 else:
     step = lambda cell, delay: {{"delay": delay, "from": {{"cell": cell}}, "to": {{"cell": cell}}}}
