@@ -10,6 +10,11 @@ from hardwall.model.estimators.edge_kalman_design import Design
 from hardwall.model.estimators.edge_kalman_tables import GAIN_FORMATS, gain_words
 
 
+def word(integer: int, f: int) -> Fraction:
+    """Return the value of an integer whose LSB is 2**-f."""
+    return Fraction(integer, 1 << f) if f >= 0 else Fraction(integer << -f)
+
+
 class Oracle:
     """The module's equations in exact rationals, rounded as documented, on unwrapped positions."""
 
@@ -20,17 +25,17 @@ class Oracle:
         self.most = 0 if isinstance(d, Filter) else 7
 
     @staticmethod
-    def to(value: Fraction, f: int, add: Fraction = Fraction(0)) -> Fraction:
-        """Return the value rounded down to an LSB, after a share of an LSB is added."""
-        lsb = Fraction(2) ** -f
-        return math.floor(value / lsb + add) * lsb
+    def to(value: Fraction, f: int, halves: int = 0) -> Fraction:
+        """Return the value rounded down to an LSB, after some halves of an LSB are added."""
+        doubled, unit = value.numerator << max(f + 1, 0), value.denominator << max(-f - 1, 0)
+        return word((doubled + halves * unit) // (2 * unit), f)
 
     def half_up(self, value: Fraction, f: int) -> Fraction:
-        return self.to(value, f, Fraction(1, 2))
+        return self.to(value, f, 1)
 
     @staticmethod
     def held(value: Fraction, fmt) -> Fraction:
-        most = fmt.max * Fraction(2) ** -fmt.f
+        most = word(fmt.max, fmt.f)
         return max(-most, min(most, value))
 
     def forget(self) -> None:
@@ -51,20 +56,20 @@ class Oracle:
     def limits(self, time: int) -> list[Fraction]:
         """Return blend, alarm, usual |r|, quiet and agile memory for the error that was learned."""
         row = self.d.limits[self.halvings * (1 << self.d.row_bits) + time]
-        return [int(word) * Fraction(2) ** -fmt.f for word, fmt in zip(row, self.d.columns, strict=True)]
+        return [word(int(each), fmt.f) for each, fmt in zip(row, self.d.columns, strict=True)]
 
     def gains(self, memory: int, time: int) -> list[Fraction]:
         """Return the memory's growth over the time and K_x, K_v / K_x, K_a / K_v, for whole half octaves."""
         # The longest time is twice the memory, two half octaves more.
         row = gain_words()[2 * (memory - time + 2) + memory % 2]
-        words = [int(word) * Fraction(2) ** -fmt.f for word, fmt in zip(row, GAIN_FORMATS, strict=True)]
+        words = [word(int(each), fmt.f) for each, fmt in zip(row, GAIN_FORMATS, strict=True)]
         # Of a rate, 24 bits are kept, the first of which is a 1 before the point for the shortest memory.
         kept = 23 + self.d.shortest
-        return words[:2] + [self.to(word / 2 ** (memory // 2), kept) for word in words[2:]]
+        return words[:2] + [self.to(each / 2 ** (memory // 2), kept) for each in words[2:]]
 
     @property
     def fastest(self) -> Fraction:
-        return self.d.velocity.max * Fraction(2) ** -self.d.velocity.f
+        return word(self.d.velocity.max, self.d.velocity.f)
 
     def limited(self, v: Fraction) -> Fraction:
         return max(-self.fastest, min(self.fastest, v))
