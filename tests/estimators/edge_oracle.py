@@ -2,6 +2,7 @@
 
 import math
 from fractions import Fraction
+from functools import cache
 
 from hardwall.model.encoder.quadrature import Seen
 from hardwall.model.estimators.bursts import NOTHING, watch
@@ -23,6 +24,10 @@ class Oracle:
         self.watched, self.share, self.halvings = NOTHING, Fraction(7, 16), 0
         # The times of counts err in patterns, so that filter learns nothing.
         self.most = 0 if isinstance(d, Filter) else 7
+        self.beyond, self.step_of_motion = Fraction(2) ** d.motion.i, word(1, d.motion.f)
+        self.fastest = word(d.velocity.max, d.velocity.f)
+        # Every row of the tables is taken many times.
+        self.row, self.gains = cache(self.row), cache(self.gains)
 
     @staticmethod
     def to(value: Fraction, f: int, halves: int = 0) -> Fraction:
@@ -43,9 +48,7 @@ class Oracle:
         self.memory = Fraction(0)
 
     def turn(self, units: int) -> Fraction:
-        d = self.d
-        beyond = Fraction(2) ** d.motion.i
-        return max(-beyond, min(beyond - Fraction(2) ** -d.motion.f, self.to(self.a * units, d.motion.f)))
+        return max(-self.beyond, min(self.beyond - self.step_of_motion, self.to(self.a * units, self.d.motion.f)))
 
     @staticmethod
     def time(units: int) -> int:
@@ -55,7 +58,11 @@ class Oracle:
 
     def limits(self, time: int) -> list[Fraction]:
         """Return blend, alarm, usual |r|, quiet and agile memory for the error that was learned."""
-        row = self.d.limits[self.halvings * (1 << self.d.row_bits) + time]
+        return self.row(self.halvings * (1 << self.d.row_bits) + time)
+
+    def row(self, number: int) -> list[Fraction]:
+        """Return a row of the table of limits."""
+        row = self.d.limits[number]
         return [word(int(each), fmt.f) for each, fmt in zip(row, self.d.columns, strict=True)]
 
     def gains(self, memory: int, time: int) -> list[Fraction]:
@@ -66,10 +73,6 @@ class Oracle:
         # Of a rate, 24 bits are kept, the first of which is a 1 before the point for the shortest memory.
         kept = 23 + self.d.shortest
         return words[:2] + [self.to(each / 2 ** (memory // 2), kept) for each in words[2:]]
-
-    @property
-    def fastest(self) -> Fraction:
-        return word(self.d.velocity.max, self.d.velocity.f)
 
     def limited(self, v: Fraction) -> Fraction:
         return max(-self.fastest, min(self.fastest, v))
@@ -117,7 +120,7 @@ class Oracle:
             x, self.known = self.x, self.known and age < wide // 2
             self.forget()
             self.x, line = x, Fraction(0)
-        bent = self.a * Fraction(d.clocks, 1 << d.unit) * Fraction(2) ** d.acceleration.f
+        bent = self.a * Fraction(d.clocks, 1 << d.unit) / word(1, d.acceleration.f)
         return self.half_up(line, d.velocity.f) * 2**d.velocity.f, math.floor(bent), flags
 
     def correct(self, passed: int, interval: int) -> int:
@@ -133,8 +136,7 @@ class Oracle:
         self.x = nearer - r
         far_faster = self.half_up(kv * nearer, d.motion.f)
         # A correction has a bit more of range than a velocity.
-        most = Fraction(2) ** d.motion.i
-        faster = max(-most, min(most - Fraction(2) ** -d.motion.f, far_faster))
+        faster = max(-self.beyond, min(self.beyond - self.step_of_motion, far_faster))
         fast = self.v + turn + faster
         self.v = self.limited(fast)
         self.a = self.held(self.a + self.half_up(ka * faster, d.a.f), d.a)
@@ -142,7 +144,7 @@ class Oracle:
 
     def size(self, value: Fraction) -> Fraction:
         """Return the magnitude of a word of the error, less an LSB if it is negative."""
-        return value if value >= 0 else -value - Fraction(2) ** -self.d.error.f
+        return value if value >= 0 else -value - word(1, self.d.error.f)
 
     def remember(self, r: Fraction, time: int, passed: int) -> int:
         """Change the mean, the memory and what is learned by an innovation; return the half octaves of the gains."""
