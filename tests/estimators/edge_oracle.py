@@ -2,12 +2,18 @@
 
 import math
 from fractions import Fraction
+from functools import cache
 
 from hardwall.model.encoder.quadrature import Seen
 from hardwall.model.estimators.bursts import NOTHING, watch
 from hardwall.model.estimators.count_kalman import Filter
 from hardwall.model.estimators.edge_kalman_design import Design
 from hardwall.model.estimators.edge_kalman_tables import GAIN_FORMATS, gain_words
+
+
+def word(integer: int, f: int) -> Fraction:
+    """Return the value of an integer whose LSB is 2**-f."""
+    return Fraction(integer, 1 << f) if f >= 0 else Fraction(integer << -f)
 
 
 class Oracle:
@@ -18,19 +24,23 @@ class Oracle:
         self.watched, self.share, self.halvings = NOTHING, Fraction(7, 16), 0
         # The times of counts err in patterns, so that filter learns nothing.
         self.most = 0 if isinstance(d, Filter) else 7
+        self.beyond, self.step_of_motion = Fraction(2) ** d.motion.i, word(1, d.motion.f)
+        self.fastest = word(d.velocity.max, d.velocity.f)
+        # Every row of the tables is taken many times.
+        self.row, self.gains = cache(self.row), cache(self.gains)
 
     @staticmethod
-    def to(value: Fraction, f: int, add: Fraction = Fraction(0)) -> Fraction:
-        """Return the value rounded down to an LSB, after a share of an LSB is added."""
-        lsb = Fraction(2) ** -f
-        return math.floor(value / lsb + add) * lsb
+    def to(value: Fraction, f: int, halves: int = 0) -> Fraction:
+        """Return the value rounded down to an LSB, after some halves of an LSB are added."""
+        doubled, unit = value.numerator << max(f + 1, 0), value.denominator << max(-f - 1, 0)
+        return word((doubled + halves * unit) // (2 * unit), f)
 
     def half_up(self, value: Fraction, f: int) -> Fraction:
-        return self.to(value, f, Fraction(1, 2))
+        return self.to(value, f, 1)
 
     @staticmethod
     def held(value: Fraction, fmt) -> Fraction:
-        most = fmt.max * Fraction(2) ** -fmt.f
+        most = word(fmt.max, fmt.f)
         return max(-most, min(most, value))
 
     def forget(self) -> None:
@@ -38,9 +48,7 @@ class Oracle:
         self.memory = Fraction(0)
 
     def turn(self, units: int) -> Fraction:
-        d = self.d
-        beyond = Fraction(2) ** d.motion.i
-        return max(-beyond, min(beyond - Fraction(2) ** -d.motion.f, self.to(self.a * units, d.motion.f)))
+        return max(-self.beyond, min(self.beyond - self.step_of_motion, self.to(self.a * units, self.d.motion.f)))
 
     @staticmethod
     def time(units: int) -> int:
@@ -50,21 +58,21 @@ class Oracle:
 
     def limits(self, time: int) -> list[Fraction]:
         """Return blend, alarm, usual |r|, quiet and agile memory for the error that was learned."""
-        row = self.d.limits[self.halvings * (1 << self.d.row_bits) + time]
-        return [int(word) * Fraction(2) ** -fmt.f for word, fmt in zip(row, self.d.columns, strict=True)]
+        return self.row(self.halvings * (1 << self.d.row_bits) + time)
+
+    def row(self, number: int) -> list[Fraction]:
+        """Return a row of the table of limits."""
+        row = self.d.limits[number]
+        return [word(int(each), fmt.f) for each, fmt in zip(row, self.d.columns, strict=True)]
 
     def gains(self, memory: int, time: int) -> list[Fraction]:
         """Return the memory's growth over the time and K_x, K_v / K_x, K_a / K_v, for whole half octaves."""
         # The longest time is twice the memory, two half octaves more.
         row = gain_words()[2 * (memory - time + 2) + memory % 2]
-        words = [int(word) * Fraction(2) ** -fmt.f for word, fmt in zip(row, GAIN_FORMATS, strict=True)]
+        words = [word(int(each), fmt.f) for each, fmt in zip(row, GAIN_FORMATS, strict=True)]
         # Of a rate, 24 bits are kept, the first of which is a 1 before the point for the shortest memory.
         kept = 23 + self.d.shortest
-        return words[:2] + [self.to(word / 2 ** (memory // 2), kept) for word in words[2:]]
-
-    @property
-    def fastest(self) -> Fraction:
-        return self.d.velocity.max * Fraction(2) ** -self.d.velocity.f
+        return words[:2] + [self.to(each / 2 ** (memory // 2), kept) for each in words[2:]]
 
     def limited(self, v: Fraction) -> Fraction:
         return max(-self.fastest, min(self.fastest, v))
@@ -112,7 +120,7 @@ class Oracle:
             x, self.known = self.x, self.known and age < wide // 2
             self.forget()
             self.x, line = x, Fraction(0)
-        bent = self.a * Fraction(d.clocks, 1 << d.unit) * Fraction(2) ** d.acceleration.f
+        bent = self.a * Fraction(d.clocks, 1 << d.unit) / word(1, d.acceleration.f)
         return self.half_up(line, d.velocity.f) * 2**d.velocity.f, math.floor(bent), flags
 
     def correct(self, passed: int, interval: int) -> int:
@@ -128,8 +136,7 @@ class Oracle:
         self.x = nearer - r
         far_faster = self.half_up(kv * nearer, d.motion.f)
         # A correction has a bit more of range than a velocity.
-        most = Fraction(2) ** d.motion.i
-        faster = max(-most, min(most - Fraction(2) ** -d.motion.f, far_faster))
+        faster = max(-self.beyond, min(self.beyond - self.step_of_motion, far_faster))
         fast = self.v + turn + faster
         self.v = self.limited(fast)
         self.a = self.held(self.a + self.half_up(ka * faster, d.a.f), d.a)
@@ -137,7 +144,7 @@ class Oracle:
 
     def size(self, value: Fraction) -> Fraction:
         """Return the magnitude of a word of the error, less an LSB if it is negative."""
-        return value if value >= 0 else -value - Fraction(2) ** -self.d.error.f
+        return value if value >= 0 else -value - word(1, self.d.error.f)
 
     def remember(self, r: Fraction, time: int, passed: int) -> int:
         """Change the mean, the memory and what is learned by an innovation; return the half octaves of the gains."""

@@ -19,7 +19,7 @@ from hardwall.model.estimators.estimate import estimate
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
 from hardwall.testing.estimators import follow, model, names, outputs
 from stimuli.decoder_outputs import Scale
-from stimuli.lengths import some_of
+from stimuli.lengths import LONG, some_of
 from stimuli.seeded import seeded
 from stimuli.specs import spec
 
@@ -198,7 +198,7 @@ def test_rtl(name):
 @pytest.mark.parametrize("name", ["paper", "mhz", "narrow", "wide"])
 def test_model_is_the_exact_equation_rounded_as_documented(name):
     d = design(name)
-    rows = list(rows_of(d, 12_000))
+    rows = list(rows_of(d, 12_000 if LONG else 6_000))
     seen, oracle, changes = model(d, rows, START), Oracle(d), set()
     for k, row in enumerate(rows):
         before = oracle.halvings
@@ -329,12 +329,14 @@ def test_an_error_between_two_halvings_costs_little(ratio):
     every, sigma, samples = 20, 0.05 * ratio, 400_000
     axis = replace(spec("mhz", "edge-kalman"), edge_error_max_counts=sigma)
 
-    def deviation(d: edge_kalman.Design) -> float:
-        displaced = np.round(sigma * every * d.clocks * np.random.default_rng(7).standard_normal(samples)).astype(int)
-        seen = walk(d, steady(d, samples, every, displaced=displaced))
-        return np.std([velocity for velocity, _ in seen[samples // 4 :]])
+    d = design("mhz")
+    displaced = np.round(sigma * every * d.clocks * np.random.default_rng(7).standard_normal(samples)).astype(int)
+    rows = [(*row, 0) for row in steady(d, samples, every, displaced=displaced)]
 
-    assert deviation(design("mhz")) < 1.5 * deviation(Told(axis, edge_kalman.Gains.default(axis)))
+    def deviation(d: edge_kalman.Design) -> float:
+        return np.std(model(d, rows, START)["velocity"][samples // 4 :])
+
+    assert deviation(d) < 1.5 * deviation(Told(axis, edge_kalman.Gains.default(axis)))
 
 
 def test_a_speed_that_jumps_is_hardly_an_error_of_edges():
@@ -416,7 +418,7 @@ def test_wrong_design_is_refused():
         Estimator(3)
 
 
-@pytest.mark.parametrize("acceleration_max_m_per_s2", [1e-30, 1e-6, 12.0, 1e6, 1e30])
+@pytest.mark.parametrize("acceleration_max_m_per_s2", [1e-30, 1e-6, 12.0, 1e6, 1e30] if LONG else [1e-30, 12.0, 1e30])
 @pytest.mark.parametrize(
     ("clock_hz", "sample_hz", "fastest_m_per_s"),
     [(10**9, 4, 490.0), (1 << 36, 4, 400.0), (1 << 36, 16, 400.0), (176, 4, 8e-5), (50_000_000, 1_000_000, 24.0)],

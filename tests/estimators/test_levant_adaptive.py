@@ -23,7 +23,7 @@ from hardwall.model.runtime.compiled import compiled
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import CAMPAIGN, SAMPLES, parameters, simulate
 from hardwall.testing.estimators import follow
-from stimuli.lengths import WHOLE, some_of
+from stimuli.lengths import LONG, WHOLE, some_of
 from stimuli.papers_signal import axis_at, swing
 from stimuli.seeded import seeded
 from stimuli.specs import spec
@@ -188,7 +188,7 @@ def test_the_float_kernel_is_the_published_algorithm_at_the_level_of_the_law():
     """Sample by sample from the kernel's own state: near an error of 0 a root makes much of a rounding."""
     axis = brisk("mhz")
     d, n, levels = axis.design.estimator, 4, set()
-    counts, _ = swing(axis.sample_hz, 0.03, TURN_S)
+    counts, _ = swing(axis.sample_hz, 0.03 if LONG else 0.01, TURN_S)
     counts = np.concatenate([counts, np.repeat(counts[-1], 10_000), np.repeat(counts[-1] + 40, 10_000)]) - counts[0]
     params, law, after = Axis(axis, floating=True).params.estimator, Law(d.lipschitz), d.start(floating=True)
     for k, count in enumerate(counts.tolist()):
@@ -237,9 +237,13 @@ def rms(of: AxisSpec, counts: np.ndarray, truth: np.ndarray, first: int = 0, flo
 @pytest.mark.parametrize("bound", BOUNDS)
 @pytest.mark.parametrize("rate", [10_000, 100_000])
 def test_word_length_costs_little(rate, bound):
-    """A rounding moves a loss, so single runs differ either way: over sixteen, RMS is within three hundredths."""
+    """A rounding moves a loss, so single runs differ either way: over sixteen, RMS is within three hundredths.
+
+    At 10 kHz they are sixteen; at 100 kHz, where a run has more losses, half of that does.
+    """
     of, squares = axis_at(NAME, rate, bound), np.zeros(2)
-    for phase in np.arange(16) / 16:
+    phases = 16 if LONG or rate < 100_000 else 8
+    for phase in np.arange(phases) / phases:
         counts, truth = swing(rate, 2.0, TURN_S, phase)
         for way, floating in enumerate((True, False)):
             squares[way] += rms(of, counts, truth, rate // 2, floating) ** 2
@@ -333,7 +337,7 @@ def test_a_count_that_flickers_holds_no_level_for_ever(axis):
     d = axis.design.estimator
     assert d.lipschitz == LARGEST_L
     samples = 60 * int(d.holds[d.words[0].high])
-    for period in (*range(2, 24), 40, 100):
+    for period in (*range(2, 24), 40, 100) if LONG else (*range(2, 8), 11, 16, 23, 40, 100):
         for duty in (0.2, 0.5, 0.8):
             states = visit(d, flicker(period, duty, samples).astype(np.int64))
             assert min(state.level for state in states[-samples // 4 :]) >= 2 * FALL

@@ -14,7 +14,7 @@ from hardwall.model.axis.monitors import Design as Monitors
 from hardwall.model.estimators import registry
 from hardwall.model.estimators.bursts import doubt_samples
 from stimuli.emissions import Emission
-from stimuli.lengths import WHOLE, some_of
+from stimuli.lengths import LONG, WHOLE, some_of
 from stimuli.specs import spec
 
 STAMPED = [name for name in registry.ESTIMATORS if registry.design_of(name).uses_stamps()]
@@ -24,8 +24,9 @@ CLOCK_HZ, COUNTS_A_METRE = 50_000_000, 10**6
 LEVELS = np.array([1, 3, 2, 0]), np.array([2, 3, 1, 0])
 """Levels of the pins from edge to edge, upwards and downwards, from 0."""
 SLOWEST_M_PER_S = Fraction(1, 50_000)
-SPEEDS = sorted({SLOWEST_M_PER_S * 7**k for k in range(6)} | {Fraction(k, 10) for k in (5, 10, 15, 20, 22, 30, 39)})
-BEYOND = [Fraction(41, 10), Fraction(5), Fraction(10), Fraction(20), Fraction(40), Fraction(50)]
+TENTHS = (5, 10, 15, 20, 22, 30, 39) if LONG else (10, 22, 39)
+SPEEDS = sorted({SLOWEST_M_PER_S * 7**k for k in range(6)} | {Fraction(k, 10) for k in TENTHS})
+BEYOND = [Fraction(k, 10) for k in ((41, 50, 100, 200, 400, 500) if LONG else (41, 500))]
 """Speeds beyond the format of 4 m/s, up to an edge a clock: the decoder's limit."""
 
 
