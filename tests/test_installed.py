@@ -49,19 +49,13 @@ print(json.dumps(lacking))
 """Prints what each command says that it lacks."""
 
 
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory) -> Path:
-    """Return the wheel, built from the sdist."""
-    return environments.built(tmp_path_factory.mktemp("built"))[1]
-
-
 @pytest.fixture(params=MATRIX or [Source()], ids=str)
-def place(request, wheel):
+def place(request, distributions):
     """Return a context with an environment of an extra."""
 
     @contextmanager
     def made(*extras: str) -> Iterator[Environment]:
-        with environments.environment(request.param, wheel, *extras) as environment:
+        with environments.environment(request.param, distributions[1], *extras) as environment:
             assert is_closed(environment)
             assert request.param.resolution != environments.OLDEST or has_an_older_numba(environment)
             yield environment
@@ -101,6 +95,15 @@ def report(done) -> dict:
     return json.loads(done.stdout)
 
 
+def every_command_says_what_it_lacks(environment: Environment, extra: str) -> None:
+    """Check that with one extra, each command that needs another one names it, and no other command lacks any."""
+    lacking = report(environment.run("python", "-c", LOOK, *COMMANDS))
+    absent = {name: [each for each in needs if each != extra] for name, needs in NEEDED.items()}
+    assert set(lacking) == {name for name, each in absent.items() if each}
+    for name, line in lacking.items():
+        assert f"pip install '.[{absent[name][0]}]'" in line, name
+
+
 def test_without_an_extra_the_first_example_of_the_guide_runs(place):
     block = page("docs/guide/python.md")
     with place() as environment:
@@ -138,6 +141,7 @@ def test_the_extra_sim_hits_and_replays(place, tmp_path):
         assert report(environment.run(*replay, **keeping))["samples"] == 2000
         assert (environment.work / "replay.png").stat().st_size > 10_000
         told(environment.run("hardwall", "connect", "nowhere"), "host")
+        every_command_says_what_it_lacks(environment, "sim")
 
 
 def without_a_compiler(environment: Environment) -> Path:
@@ -154,6 +158,7 @@ def test_the_extra_host_speaks_to_a_board(place):
         found = report(environment.run("hardwall", "connect", board.tcp, "--json"))
         assert found["state"] == "DISARMED"
         told(environment.run(*HIT), "sim")
+        every_command_says_what_it_lacks(environment, "host")
 
 
 def test_the_extra_testing_tests_a_block(place):
@@ -163,13 +168,3 @@ def test_the_extra_testing_tests_a_block(place):
         test = "python", "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_moving_average.py"
         done = environment.run(*test, path=os.environ["PATH"], HARDWALL_SAMPLES=1000)
         assert done.stdout.splitlines()[-1].startswith("1 passed"), done.stdout
-
-
-@pytest.mark.parametrize("extra", ["sim", "host"])
-def test_a_command_says_which_extra_it_lacks(place, extra):
-    with place(extra) as environment:
-        lacking = report(environment.run("python", "-c", LOOK, *COMMANDS))
-        absent = {name: [each for each in needs if each != extra] for name, needs in NEEDED.items()}
-        assert set(lacking) == {name for name, each in absent.items() if each}
-        for name, line in lacking.items():
-            assert f"pip install '.[{absent[name][0]}]'" in line, name
