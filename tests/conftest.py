@@ -57,6 +57,15 @@ def recordings() -> Path:
     return folder
 
 
+@pytest.fixture(scope="session")
+def distributions(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Return the sdist and the wheel of the tree, which are built once for all workers."""
+    from support import environments, once  # noqa: PLC0415
+
+    dist = once.once(tmp_path_factory, "built", environments.built) / "dist"
+    return next(dist.glob("*.tar.gz")), next(dist.glob("*.whl"))
+
+
 @pytest.fixture
 def fresh(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Send results to an empty folder, which is made for those that have one; compiled files stay where they are."""

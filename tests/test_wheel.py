@@ -18,10 +18,10 @@ for name in sys.argv[1:]:
 """
 
 
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory) -> Path:
+@pytest.fixture
+def wheel(distributions) -> Path:
     """Return the wheel, built from the sdist."""
-    return environments.built(tmp_path_factory.mktemp("built"))[1]
+    return distributions[1]
 
 
 def in_tree() -> set[str]:

@@ -34,6 +34,19 @@ from hardwall.cli.app import main
 sys.argv = ["hardwall", *{arguments!r}]
 main()
 """
+END = "-- end of a call --"
+EACH_WITHOUT = (
+    WITHOUT.partition("sys.argv")[0]
+    + f"""
+for arguments in {{calls!r}}:
+    sys.argv = ["hardwall", *arguments]
+    try:
+        main()
+    except SystemExit as end:
+        print(end.code, {END!r}, flush=True)
+        print({END!r}, end="", file=sys.stderr, flush=True)
+"""
+)
 
 
 def comes_with(extra: str) -> str:
@@ -48,6 +61,19 @@ def without(absent: set[str], *arguments: str) -> subprocess.CompletedProcess:
     """Run the command line as if some packages were not installed."""
     program = WITHOUT.format(absent=absent, arguments=arguments)
     return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+
+
+def each_without(absent: set[str], *calls: tuple[str, ...]) -> list[str]:
+    """Call the command line several times as `without` does, in one process; return what each says on stderr.
+
+    Every call must end with the code 1, and with nothing on stdout.
+    """
+    program = EACH_WITHOUT.format(absent=absent, calls=calls)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.stdout.splitlines() == [f"1 {END}"] * len(calls), done.stderr
+    *said, rest = done.stderr.split(END)
+    assert rest == ""
+    return said
 
 
 def test_help_shows_every_command_and_loads_none():
@@ -106,11 +132,10 @@ def test_commands_that_speak_to_a_board_import_nothing_of_the_simulation():
     assert [each for each in done.stdout.split() if f"{each}.".startswith("hardwall.sim.")] == []
 
 
-@pytest.mark.parametrize("name", OF_A_BOARD)
-def test_a_command_that_speaks_to_a_board_needs_the_extra_host_alone(name):
-    done = without(SIMULATING, name, *PORTS.get(name, ("nowhere",)))
-    assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr.startswith("hardwall: error: nowhere cannot be opened: there is no such port")
+def test_a_command_that_speaks_to_a_board_needs_the_extra_host_alone():
+    calls = [(name, *PORTS.get(name, ("nowhere",))) for name in OF_A_BOARD]
+    for call_, said in zip(calls, each_without(SIMULATING, *calls), strict=True):
+        assert said.startswith("hardwall: error: nowhere cannot be opened: there is no such port"), call_
 
 
 @pytest.mark.parametrize("name", OF_A_BOARD if LONG else OF_A_BOARD[:1])

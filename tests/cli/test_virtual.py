@@ -22,14 +22,13 @@ from stimuli import frames
 from stimuli.lengths import LONG
 from support.command_line import call
 from support.processes import ended, line, started, wait_until
-from support.virtual_boards import command, running
+from support.virtual_boards import SCENE, command, running
 
-CLOCK = {"controller.clock_hz": 4_000_000}
-REGISTERS = RegisterMap(load("seed-2011", CLOCK).spec)
+REGISTERS = RegisterMap(load("seed-2011", SCENE).spec)
 
 
 def test_a_client_that_others_wrote_reads_and_writes_and_sees_a_loop_open():
-    with running(CLOCK, "--tcp", "0", "--speed", "0") as board:
+    with running(SCENE, "--tcp", "0", "--speed", "0") as board:
         client = ModbusTcpClient("127.0.0.1", port=int(board.tcp.rpartition(":")[2]), framer=FramerType.RTU, timeout=60)
         assert client.connect()
 
@@ -57,7 +56,7 @@ def test_a_client_that_others_wrote_reads_and_writes_and_sees_a_loop_open():
 
 
 def test_the_serial_port_is_one_for_any_program():
-    with running(CLOCK, "--speed", "0") as board:
+    with running(SCENE, "--speed", "0") as board:
         port = os.open(board.path, os.O_RDWR | os.O_NOCTTY)
         os.write(port, framed(b"\1" + frames.read(0, 2)))
         answer = b""
@@ -67,32 +66,36 @@ def test_the_serial_port_is_one_for_any_program():
         os.close(port)
 
 
-@pytest.mark.parametrize("by", ["tcp", "terminal"])
-def test_a_flood_of_random_bytes_silences_no_port(by):
+def test_a_flood_of_random_bytes_silences_no_port():
     """2.9 MB, which the line would take half a minute of the board's time for, and none of which is a request.
 
     The host's five tries of a second are of the board's time, too: it would give up long before the line is through.
     """
-    with running(CLOCK, "--tcp", "0", "--speed", "0") as board:
+    with running(SCENE, "--tcp", "0", "--speed", "0") as board:
         junk, port = random.Random(1).randbytes(2_900_000), os.open(board.path, os.O_RDWR | os.O_NOCTTY)
-        if by == "tcp":
+
+        def by_tcp() -> None:
             with socket.create_connection(("127.0.0.1", int(board.tcp.rpartition(":")[2])), timeout=60) as guest:
                 with suppress(ConnectionError):
                     guest.sendall(junk)
                 with suppress(ConnectionError):
                     assert guest.recv(1) == b""
-        else:
+
+        def by_terminal() -> None:
             view = memoryview(junk)
             while view:
                 view = view[os.write(port, view) :]
-        with connect(board.path, answer_s=1.0) as axis:
-            assert axis.device.identity == REGISTERS.identity
-        connect(board.tcp, answer_s=1.0).close()
+
+        for flood in (by_tcp, by_terminal):
+            flood()
+            with connect(board.path, answer_s=1.0) as axis:
+                assert axis.device.identity == REGISTERS.identity
+            connect(board.tcp, answer_s=1.0).close()
         os.close(port)
 
 
 def test_it_prints_the_count_of_every_sample_and_ends_after_the_time_that_was_asked_for():
-    words = command(CLOCK, "--seconds", "0.04", "--counts")
+    words = command(SCENE, "--seconds", "0.04", "--counts")
     done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     lines = [line.split() for line in done.stdout.splitlines() if line.startswith("counts:")]
@@ -103,7 +106,7 @@ def test_it_prints_the_count_of_every_sample_and_ends_after_the_time_that_was_as
 
 
 def test_the_last_counts_are_printed_too():
-    words = command(CLOCK, "--seconds", "0.003", "--counts", "--speed", "0")
+    words = command(SCENE, "--seconds", "0.003", "--counts", "--speed", "0")
     done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     (line,) = [line.split() for line in done.stdout.splitlines() if line.startswith("counts:")]
@@ -112,7 +115,7 @@ def test_the_last_counts_are_printed_too():
 
 def test_an_interrupt_loses_no_counts():
     """At a run in 0.2 s a line of counts would take 4 s."""
-    with started(*command(CLOCK, "--counts", "--speed", "0.005")) as process:
+    with started(*command(SCENE, "--counts", "--speed", "0.005")) as process:
         while not line(process).startswith("orders:"):
             pass
         time.sleep(1.0)
@@ -134,7 +137,7 @@ def test_an_interrupt_loses_no_counts():
     ],
 )
 def test_what_cannot_be_is_one_line(monkeypatch, capsys, arguments, message):
-    code, out, err = call(monkeypatch, capsys, *command(CLOCK, *arguments)[1:])
+    code, out, err = call(monkeypatch, capsys, *command(SCENE, *arguments)[1:])
     assert (code, out) == (2, "")
     assert re.fullmatch(f"hardwall: error: {message}\n", err)
 
@@ -142,7 +145,7 @@ def test_what_cannot_be_is_one_line(monkeypatch, capsys, arguments, message):
 def test_a_port_that_is_taken_is_one_line(monkeypatch, capsys):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        code, _, err = call(monkeypatch, capsys, *command(CLOCK, "--tcp", str(port))[1:])
+        code, _, err = call(monkeypatch, capsys, *command(SCENE, "--tcp", str(port))[1:])
     assert (code, err) == (1, f"hardwall: error: port {port} of 127.0.0.1 cannot be opened: Address already in use\n")
 
 
@@ -162,14 +165,14 @@ def test_a_flood_of_orders_does_not_hold_it_up(flood, tmp_path):
         flood = tmp_path / flood
         flood.write_text("y\n" * 100_000)
     with open(flood, "rb") as orders:
-        words = command(CLOCK, "--seconds", "0.02")
+        words = command(SCENE, "--seconds", "0.02")
         done = subprocess.run(words, stdin=orders, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 0, done.stderr
     assert "the order must be one of hold, " in done.stderr
 
 
 def test_it_is_no_faster_than_asked_for_however_much_a_host_says():
-    with running(CLOCK, "--tcp", "0", "--speed", "0.2", "--seconds", "0.3") as board:
+    with running(SCENE, "--tcp", "0", "--speed", "0.2", "--seconds", "0.3") as board:
         with socket.create_connection(("127.0.0.1", int(board.tcp.rpartition(":")[2])), timeout=60) as host:
             host.setblocking(False)
             while board.process.poll() is None:

@@ -19,6 +19,7 @@ from hardwall.model.axis.registers import RegisterMap
 from hardwall.sim.rtl.verilator import LINT_OPTIONS, environment
 from stimuli.lengths import LONG
 from stimuli.specs import spec
+from support.once import once
 from support.tables import rows, verilog_ports
 
 TOPS = {"axis": Axis, "board": Board, "axi": lambda axis: Board(axis, AxiLink(RegisterMap(axis)))}
@@ -67,10 +68,16 @@ def kept(tmp_path_factory) -> Path:
     return tmp_path_factory.mktemp("kept")
 
 
-@pytest.mark.parametrize("home", ["absent", "relative", "", "/proc/x"])
-def test_yosys_works_without_a_home(kept, tmp_path, monkeypatch, home):
+@pytest.fixture(scope="module")
+def narrow() -> tuple[Axis, str]:
+    """Return an axis, and its Verilog as it is written where there is a home."""
     axis = Axis(spec("narrow", "fdm"))
-    text = to_verilog(axis, "axis")
+    return axis, to_verilog(axis, "axis")
+
+
+@pytest.mark.parametrize("home", ["absent", "relative", "", "/proc/x"])
+def test_yosys_works_without_a_home(kept, narrow, tmp_path, monkeypatch, home):
+    axis, text = narrow
     monkeypatch.setenv("HARDWALL_BUILD", str(kept))
     monkeypatch.setenv("HOME", str(tmp_path / home) if home == "absent" else home)
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
@@ -111,9 +118,11 @@ def test_other_components_are_refused():
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory) -> Path:
-    folder = tmp_path_factory.mktemp("verilog") / "made"
-    assert write(spec("mhz"), folder, {"beside.txt": "any text\n"}) == tuple(folder / name for name in WRITTEN)
-    return folder
+    def write_it(outer: Path) -> None:
+        folder = outer / "made"
+        assert write(spec("mhz"), folder, {"beside.txt": "any text\n"}) == tuple(folder / name for name in WRITTEN)
+
+    return once(tmp_path_factory, "verilog", write_it) / "made"
 
 
 def test_a_disk_that_is_full_truncates_no_file(written, tmp_path):

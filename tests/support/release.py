@@ -27,7 +27,12 @@ SUMS, LICENCES = "SHA256SUMS", "LICENCES.txt"
 
 
 def made(
-    folder: Path, scenes: Iterable[str], boards: Iterable[str], with_pages: bool, extras: Iterable[str] = EXTRAS
+    folder: Path,
+    scenes: Iterable[str],
+    boards: Iterable[str],
+    with_pages: bool,
+    extras: Iterable[str] = EXTRAS,
+    distributions: Iterable[Path] = (),
 ) -> list[Path]:
     """Make a release in an empty folder; return its files.
 
@@ -37,13 +42,14 @@ def made(
         boards: the boards whose bitstreams it has, with their reports and their wiring.
         with_pages: whether it has the pages.
         extras: the extras whose packages' licences it lists; they must be installed.
+        distributions: the sdist and the wheel, where they are built already.
     """
     with tempfile.TemporaryDirectory() as name:
         work = Path(name)
-        distributions = environments.built(work)
-        for path in distributions:
+        sdist, wheel = distributions or environments.built(work)
+        for path in (sdist, wheel):
             shutil.copy(path, folder)
-        stem = distributions[0].name.removesuffix(".tar.gz")
+        stem = sdist.name.removesuffix(".tar.gz")
         for task, names, kind in (("verilog", scenes, "verilog"), ("board", boards, "boards")):
             tree = work / f"{stem}-{kind}"
             for each in names:

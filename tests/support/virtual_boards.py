@@ -9,8 +9,8 @@ from .processes import HARDWALL
 
 SCENE = {"controller.clock_hz": 1_000_000, "encoder.count_m": 10e-6, "protocol.start_m": -1e-3, "handle.coulomb_n": 0.0}
 """Changes of `seed-2011` to few clocks: a part of a core at real time. Without friction a contact has one position."""
-ACCELERATED = SCENE | {"controller.estimator": "levant-2"}
-"""Changes to an estimator with an acceleration."""
+ACCELERATED = SCENE | {"controller.estimator": "kalman", "virtual_mass.most_kg": 0.2}
+"""Changes to an estimator with an acceleration, and to a force law that uses it."""
 SMALL = {"controller.estimator": "fdm"}
 """Changes besides, for a netlist that is soon made."""
 PACE = 0.2

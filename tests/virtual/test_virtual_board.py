@@ -13,7 +13,7 @@ from hardwall.sim.virtual import virtual_board
 from hardwall.sim.virtual.virtual_board import Hand, VirtualBoard
 from stimuli import frames
 from stimuli.lengths import LONG, long_form
-from support.virtual_boards import SCENE, SMALL
+from support.virtual_boards import ACCELERATED, SCENE, SMALL
 
 STIFFNESS_N_PER_M, DAMPING_N_S_PER_M = 2000.0, 5.0
 BAUD = 230_400
@@ -32,7 +32,6 @@ STAGES = {
 """The drive stages; a sample has two periods of the bridge."""
 FINE = {"controller.clock_hz": 4_000_000}
 """A clock that leaves the bridge steps as fine as a steady contact needs."""
-MASS = {"controller.estimator": "kalman", "virtual_mass.most_kg": 0.2}
 WALL_M = 1e-3
 """The wall, behind the count 0, which is where the board is powered up."""
 
@@ -129,7 +128,7 @@ def test_a_motor_that_is_swapped_runs_away_and_trips(board, swapped, state, caus
 @pytest.mark.parametrize("mass_kg", [-0.15, 0.15])
 def test_a_mass_drives_in_free_space_and_trips_as_any_drive(mass_kg):
     """A pushed handle without a wall: too fast in the end, after which nothing drives it."""
-    with VirtualBoard(load("seed-2011", SCENE | MASS)) as board:
+    with VirtualBoard(load("seed-2011", ACCELERATED)) as board:
         host, limit_m_per_s = SerialHost(board), 0.2
         host.bring_up(0.0, 0.0, WALL_M)
         host.write_si("supervisor_velocity_limit", limit_m_per_s)
