@@ -17,6 +17,7 @@ from hardwall.model.encoder.quadrature import RUN_MAX, Seen
 from hardwall.model.estimators import registry
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.runtime.compiled import compiled
+from stimuli.lengths import LONG
 from stimuli.locked import mean_error
 from stimuli.specs import spec
 
@@ -32,6 +33,17 @@ STEADY = {
     "largest down": (25, 1),
     "beyond": (3, 0),
 }
+EVERY_SPEED = "levant", "kalman", "period", "foaw"
+"""Estimators of every kind: by the count or by stamps, with scalars or arrays as their state."""
+FEW_SPEEDS = "slowest", "largest up", "beyond"
+"""What the others run at, unless a number of samples is asked for: long rests, many edges a sample, and saturation."""
+WHOLE = LONG or "HARDWALL_ENDURANCE" in os.environ
+RUNS = [
+    (estimator, speed)
+    for estimator in registry.ESTIMATORS
+    for speed in STEADY
+    if WHOLE or estimator in EVERY_SPEED or speed in FEW_SPEEDS
+]
 
 
 class Widths(NamedTuple):
@@ -95,8 +107,7 @@ def test_what_is_made_up_is_what_a_decoder_shows():
             assert [getattr(shown, name) for name in names] == [getattr(made, name) for name in names], now
 
 
-@pytest.mark.parametrize("speed", STEADY)
-@pytest.mark.parametrize("estimator", registry.ESTIMATORS)
+@pytest.mark.parametrize(("estimator", "speed"), RUNS)
 def test_it_neither_drifts_nor_stops_short(estimator, speed):
     """No tenth of a steady run has larger extremes than the fourth: the estimator settles before, even from rest."""
     axis_spec = spec("mhz", estimator)

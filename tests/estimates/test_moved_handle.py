@@ -60,7 +60,7 @@ def test_every_force_is_that_of_the_place_that_was_counted(changes, samples):
 
 
 def test_the_rtl_answers_with_the_words_of_fixed():
-    known = scene()
+    known = scene(controller__estimator="levant")
     fixed, rtl = (moved_handle.answer(known, SINE, 500, 1e-3, backend) for backend in ("fixed", "rtl"))
     assert fixed.drives.tolist() == rtl.drives.tolist()
     assert fixed.flags == rtl.flags == []

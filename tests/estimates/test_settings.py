@@ -9,11 +9,14 @@ from hardwall.model.record_axis import DECODER_CLOCKS
 from hardwall.sim.estimates.replay import replay
 from hardwall.sim.estimates.replay_plan import ArgumentError
 from hardwall.sim.estimates.settings import SettingError, Settings, names_of, settings_of
+from stimuli.lengths import LONG
 from stimuli.replays import BOUND, COARSEN, recording, swing
 
+OF_RATES = [(name, 333.0) for name in ESTIMATORS] + [(name, 1000.0) for name in (ESTIMATORS if LONG else ["levant"])]
+"""Every estimator at a rate that no power of two divides; by `make soak` also at one of whole milliseconds."""
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
-@pytest.mark.parametrize("rate", [1000.0, 333.0])
+
+@pytest.mark.parametrize(("estimator", "rate"), OF_RATES)
 def test_the_gains_of_a_report_can_be_given_back(estimator, rate):
     """Units and powers of time are those of the report: the words are the same, to the last."""
     made = recording(swing().counts, rate)

@@ -19,8 +19,8 @@ from stimuli.lengths import LONG
 from stimuli.outputs import EVERY_OUTPUT
 from stimuli.replays import BOUND, COARSEN, recording, swing
 
-# One estimator on the count, one with a memory, one on the stamps; by `make soak` all.
-KINDS = [("levant", "u"), ("window", "u"), ("levant-edge", "u")]
+# One estimator on the count, with a memory, and one on the stamps; by `make soak` all.
+KINDS = [("window", "u"), ("levant-edge", "u")]
 SOME = pytest.mark.parametrize(("estimator", "output"), EVERY_OUTPUT if LONG else KINDS)
 
 

@@ -137,7 +137,7 @@ def test_times_of_nanoseconds_are_as_good_as_seconds():
     assert velocity_of_edges(stamps, counts, 1e3, "period", **WIDE).tolist() == made.tolist()
 
 
-@pytest.mark.parametrize("rate", [1000, 10_000, 100_000])
+@pytest.mark.parametrize("rate", [1000, 10_000, 100_000] if LONG else [1000, 100_000])
 @pytest.mark.parametrize("estimator", STAMPED if LONG else ["period", "mt"])
 def test_edges_far_apart_are_those_of_the_hardware_at_that_rate(estimator, rate):
     """The axis with true seconds, on edges 10 to 2000 samples apart, up to half a second."""

@@ -23,7 +23,7 @@ from stimuli.specs import PAPER, spec
 COUNT_M = 2.0**-20
 SPEC = replace(spec("paper", "fdm"), count_m=COUNT_M, actuation_hz=PAPER["sample_hz"])
 EVERY = [(name, backend) for name in ESTIMATORS for backend in ("fixed", "float")]
-SOME = EVERY if LONG else [("levant", "fixed"), ("edge-kalman", "float")]
+SOME = EVERY if LONG else [("levant", "float"), ("edge-kalman", "fixed")]
 SOME_ACCELERATED = [("edge-kalman", "fixed"), ("levant-2", "float")]
 if LONG:
     SOME_ACCELERATED = [(name, backend) for name, backend in EVERY if issubclass(ESTIMATORS[name], Accelerated)]

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -37,6 +38,7 @@ from hardwall.sim.pictures.style import PAGE_IN, lay_out, save
 from hardwall.sim.studies.accuracy import Accuracy
 from hardwall.sim.studies.published import LOOPS
 from hardwall.sim.studies.shortcuts import SCATTER
+from hardwall.sim.studies.zwidth import ZWidth
 from stimuli import results
 from stimuli.lengths import LONG
 from stimuli.replays import BOUND, COARSEN, swing
@@ -63,10 +65,22 @@ def errors_at_rates() -> dict:
     }
 
 
-def every_estimator_mapped() -> Figure:
-    return zwidth.draw(
-        results.zwidth([results.map_of(name, 2e4, 200) for name in ("fdm-30", "fdm-100", "adjusted")] * 4)
-    )
+@cache
+def many_maps() -> ZWidth:
+    """Return twelve maps, always the same, as their limits take long to compute."""
+    return results.zwidth([results.map_of(name, 2e4, 200) for name in ("fdm-30", "fdm-100", "adjusted")] * 4)
+
+
+@cache
+def pictures_of_a_drop() -> dict[str, Figure]:
+    """Return the pictures of a drop, which are drawn together: each is laid out by the test that looks at it."""
+    return drop.draw(results.dropped())
+
+
+@cache
+def pictures_of_rendered_walls() -> dict[str, Figure]:
+    """Return the pictures of rendered walls, which are drawn together."""
+    return rendered.draw(results.rendered_walls())
 
 
 PICTURES = {
@@ -91,15 +105,12 @@ PICTURES = {
     "rates": lambda: rates.draw(results.rate_gains()),
     "rates beside errors": lambda: rates.draw_beside_errors(errors_at_rates(), results.rate_gains().report()),
     **{
-        f"rendered, {name}": lambda name=name: rendered.draw(results.rendered_walls())[name]
+        f"rendered, {name}": lambda name=name: pictures_of_rendered_walls()[name]
         for name in ("impedance", "bandwidth", "contact")
     },
     "zwidth": lambda: zwidth.draw(results.maps()),
-    "zwidth of many": every_estimator_mapped,
-    **{
-        f"drop, {name}": lambda name=name: drop.draw(results.dropped())[name]
-        for name in ("rest", "law", "ends", "maps")
-    },
+    "zwidth of many": lambda: zwidth.draw(many_maps()),
+    **{f"drop, {name}": lambda name=name: pictures_of_a_drop()[name] for name in ("rest", "law", "ends", "maps")},
     "trade": lambda: trade.draw(results.traded()),
 }
 
@@ -336,7 +347,7 @@ def test_an_area_that_is_far_from_the_others_is_on_the_panel():
 
 
 def test_the_names_of_many_maps_are_beside_the_panel_and_below_the_title():
-    picture = every_estimator_mapped()
+    picture = zwidth.draw(many_maps())
     lay_out(picture)
     (axes,) = picture.axes
     names, panel = axes.get_legend().get_window_extent(), axes.get_window_extent()

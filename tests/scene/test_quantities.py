@@ -13,6 +13,7 @@ from hardwall.sim.scene.schema import Scene
 from hardwall.sim.scene.sentences import sections_of
 from hardwall.sim.walls import hit
 from stimuli.bristles import LUGRE_KEYS
+from stimuli.lengths import LONG
 
 # Thirty samples beside the wall, so that the stiffest devices do not take long either.
 BRIEF = {
@@ -68,7 +69,7 @@ def run(base: str, changes: dict[str, float]) -> list[hit.Hit]:
 
 
 @pytest.mark.parametrize("base", BASES)
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(derandomize=True, deadline=None, max_examples=60 if LONG else 20)
 @given(data=st.data())
 def test_the_ends_of_all_ranges_are_refused_or_give_finite_numbers(base, data):
     ends = st.sampled_from(ends_of(base))

@@ -13,7 +13,7 @@ from hardwall.sim.studies.waiting_time import SCENE, Command
 from stimuli.lengths import LONG
 from support.reports import check
 
-HIT = ("hit", SCENE, "--set", "protocol.start_m=-1e-5", *waiting_time.SHORT, "--json")
+HIT = ("hit", SCENE, "--set", "protocol.start_m=-1e-5", *waiting_time.SHORTER, "--json")
 COMMANDS = {"fixed (samples/s)": Command(HIT, 1, speed=True), "a hit, nothing compiled (s)": Command(HIT, 1, cold=True)}
 
 PARTS = (

@@ -16,6 +16,7 @@ from hardwall.sim.studies import gains
 from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.zwidth import Map
 from stimuli import results
+from stimuli.lengths import LONG
 from stimuli.maps import Known
 from support.command_line import call
 
@@ -25,8 +26,9 @@ BRIEF = {
     "zwidth.damping_from_n_s_per_m": 10.0,
     "zwidth.damping_to_n_s_per_m": 12.5,
     "zwidth.damping_step_n_s_per_m": 2.5,
-    "protocol.settle_s": 2.0,
-    "protocol.measure_s": 0.5,
+    "protocol.settle_s": 1.0,
+    "protocol.mean_s": 0.2,
+    "protocol.measure_s": 0.3,
 }
 SET = [word for key, value in BRIEF.items() for word in ("--set", f"{key}={value}")]
 
@@ -203,6 +205,7 @@ def test_the_sufficient_condition(lam, alpha, meets):
 def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(gains, "LAMBDAS", np.array([1.0, 4.0]))
     monkeypatch.setattr(gains, "ALPHAS", np.array([1.0, 4.0]))
+    monkeypatch.setattr(gains, "HALVINGS", 3 if LONG else 1)
     picture = tmp_path / "gains.svg"
     code, out, _ = call(monkeypatch, capsys, "gains", *SET, "--workers", 1, "--json", "--plot", picture)
     assert code == 0

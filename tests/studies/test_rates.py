@@ -11,13 +11,14 @@ from hardwall.sim.walls import methods, theory
 from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.zwidth import Map
 from stimuli.maps import Known
+from stimuli.scenes import TWO_SECONDS
 from support.command_line import call
 
 CURVES = [methods.Curve("kalman", "kalman", "u"), methods.Curve("fdm", "fdm", "u")]
 FEW = {
     "zwidth.damping_from_n_s_per_m": 30.0, "zwidth.damping_to_n_s_per_m": 30.0,
     "zwidth.damping_step_n_s_per_m": 10.0, "zwidth.stiffness_step_n_per_m": 25e3,
-}  # fmt: skip
+} | TWO_SECONDS  # fmt: skip
 
 
 class OneWall(Known):

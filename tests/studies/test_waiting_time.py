@@ -12,7 +12,7 @@ from hardwall.sim.studies.waiting_time import SCENE, Command, Wait
 from support.command_line import call
 
 AT_THE_WALL = ("--set", "protocol.start_m=-1e-5")
-HIT = ("hit", SCENE, *AT_THE_WALL, *waiting_time.SHORT, "--json")
+HIT = ("hit", SCENE, *AT_THE_WALL, *waiting_time.SHORTER, "--json")
 
 
 def test_two_versions_are_timed_in_turns(monkeypatch, capsys):

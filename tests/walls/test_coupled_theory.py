@@ -34,7 +34,7 @@ STEEP = {
 
 def scene(stiffness_n_per_m: float, *values: float, **others: float):
     changes = LINEAR | PROMPT | dict(zip(KEYS, values, strict=True)) | {"controller.estimator": "fdm"}
-    changes |= {"coupling.stiffness_n_per_m": stiffness_n_per_m, "protocol.settle_s": 5.0}
+    changes |= {"coupling.stiffness_n_per_m": stiffness_n_per_m, "protocol.settle_s": 5.0 if LONG else 2.5}
     return load("seed-2011", changes | {f"coupling.{key}": value for key, value in others.items()})
 
 

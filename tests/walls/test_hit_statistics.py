@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hardwall.sim.scene.load import load
 from hardwall.sim.walls.hit_statistics import ENOUGH, Tally
+from stimuli.lengths import LONG
 
 # A window has 50 samples: the first one is from 100 to 150, and the one before it from 50 on.
 PROTOCOL = {
@@ -76,6 +77,7 @@ def bouncing(flight: float, keeps: float, wait: int = 0) -> np.ndarray:
 LONG_LOOK = PROTOCOL | {"protocol.longest_s": 11.9}
 
 
+@settings(max_examples=100 if LONG else 40)
 @given(st.floats(4, 300), st.floats(0.3, 0.97), st.integers(0, 300))
 def test_a_handle_whose_bounces_get_lower_is_never_unstable(flight, keeps, wait):
     """However few of them a window has, and also where one is on its way to the wall."""
