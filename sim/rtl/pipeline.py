@@ -71,9 +71,10 @@ def synthesise_axes(spec: AxesSpec, device: str, supervised: bool, seeds: Sequen
         given.unlink()
 
     reports = [flow.report_of(whole_folder(netlist / f"alone-{seed}", partial(place, seed=seed))) for seed in seeds]
-    speeds = [1e3 / timing(part, report)[0] for report in reports]
+    cells = flow.cells_of(netlist)
+    speeds = [1e3 / timing(part, report, cells)[0] for report in reports]
     return {
-        **size(part, reports[0]["utilization"], [cell["type"] for cell in flow.cells_of(netlist).values()]),
+        **size(part, reports[0]["utilization"], [cell["type"] for cell in cells.values()]),
         "latency_clocks": axes.latency,
         "seeds": list(seeds),
         "fmax_mhz_seeds": [round(speed, 2) for speed in speeds],
