@@ -28,7 +28,6 @@ TOOLS = {"cd", "cp", "dask", "fusesoc", "git", "mkdir", "pip", "pytest", "python
 """First words of commands that are not run, besides `hardwall` and `make`."""
 MANY_COMMANDS = (
     "guide/axes",
-    "guide/estimator",
     "guide/speed",
     "reference/hardware",
     "reference/scenes",

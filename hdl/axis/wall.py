@@ -22,8 +22,8 @@ def split(value: Value) -> list[Value]:
 def products(name: str, gain: Value, operand: Value) -> tuple[list, Value]:
     """Return the assignments that take the products of a gain and the parts of an operand, and the registers' sum.
 
-    Nothing but a register is behind a multiplier: what adds the parts has a clock of its own. It has no reset, like the
-    register inside a multiplier of the iCE40, which then takes its place.
+    Nothing but a register is behind a multiplier: what adds the parts has a clock of its own. It has no reset,
+    because the register inside a multiplier of the iCE40, which may take its place, has only an asynchronous one.
     """
     made = [gain * part for part in split(operand)]
     taken = [Signal(each.shape(), name=f"{name}_{place}", reset_less=True) for place, each in enumerate(made)]

@@ -140,6 +140,7 @@ BEHIND = {"TOPOUTPUT_SELECT": "01", "BOTOUTPUT_SELECT": "01"}
         (multiplier("SB_LUT4", "I0", **BEHIND), False),
         (multiplier(TOPOUTPUT_SELECT="11", BOTOUTPUT_SELECT="01"), False),
         (multiplier(TOPOUTPUT_SELECT="01", BOTOUTPUT_SELECT="11"), False),
+        (multiplier("SB_DFFN", TOPOUTPUT_SELECT="11", BOTOUTPUT_SELECT="01"), True),
         (multiplier(port="E", TOPOUTPUT_SELECT="11", BOTOUTPUT_SELECT="01"), True),
         (multiplier("SB_LUT4", "I0", TOPOUTPUT_SELECT="11", BOTOUTPUT_SELECT="01"), True),
         (multiplier("SB_LUT4", "I0", TOPOUTPUT_SELECT="01", BOTOUTPUT_SELECT="11"), True),
@@ -170,11 +171,20 @@ def test_a_multiplier_with_a_register_behind_it_is_part_of_a_path():
     step = {"delay": 10.0, "from": {"cell": "u_SB_DFF_Q"}, "to": {"cell": "v_SB_DFF_D"}}
     paths = [{"from": "posedge clk", "to": "posedge clk", "path": [step]}]
     report = {"fmax": {"clk": {"achieved": 100.0}}, "critical_paths": paths, "detailed_net_timings": nets}
-    assert timing.timing(part, report, multiplier(**BEHIND)) == (6.0 + part.multiplier_ns + 2.0, "through a multiplier")
+    assert timing.timing(part, report, multiplier(**BEHIND)) == (
+        pytest.approx(6.0 + part.multiplier_ns + 2.0 + timing.SETUP_NS),
+        "through a multiplier",
+    )
     # Without a register it is in the paths of a clock of its own.
     assert timing.timing(part, report, multiplier()) == (10.0, "u to v")
     report["fmax"]["clk"]["achieved"] = 50.0
     assert timing.timing(part, report, multiplier(**BEHIND)) == (20.0, "u to v")
+    # A way that nextpnr says nothing of is no way of 0 ns.
+    half = multiplier(TOPOUTPUT_SELECT="11", BOTOUTPUT_SELECT="01")
+    for unsaid, netlist in ((nets[:2], multiplier(**BEHIND)), (nets[:2], half), (nets[4:], half)):
+        rest = {"detailed_net_timings": [each for each in nets if each not in unsaid]}
+        with pytest.raises(SynthesisError, match=r"^nextpnr gives no delay into or out of the multiplier made_DSP$"):
+            timing.timing(part, report | rest, netlist)
 
 
 def test_a_clock_that_is_missed_is_a_result(calls):

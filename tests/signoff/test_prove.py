@@ -23,8 +23,8 @@ from signoff.proofs.widths import Widths, extremes, range_of_product
 from stimuli.lengths import LONG
 
 QUICK = [known for known in properties.PROPERTIES if known.quick]
-PROVEN = QUICK if LONG else list({known.block.split()[0]: known for known in QUICK}.values())
-"""The quick ones, of which the short form proves the last of each kind of block."""
+PROVEN = QUICK if LONG else list({known.block.split()[0]: known for known in reversed(QUICK)}.values())
+"""The quick ones, of which the short form proves the first of each kind of block."""
 
 
 class Sum(wiring.Component):
