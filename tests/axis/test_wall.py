@@ -8,7 +8,7 @@ from fractions import Fraction
 import cocotb
 import numpy as np
 import pytest
-from cocotb.triggers import RisingEdge
+from cocotb.triggers import ClockCycles, RisingEdge
 
 from hardwall.hdl.axis.wall import Wall
 from hardwall.model.axes.axis import Axes, AxesSpec
@@ -128,6 +128,30 @@ async def follows_model(dut):
         expected = model(component.design, inputs.rows)
         assert {-top, 0, top} <= set(expected)
         check(inputs, outputs, {"force": np.array(expected)}, component.latency)
+
+
+@cocotb.test()
+async def a_reset_at_any_clock_of_a_sample_leaves_nothing_of_it(dut):
+    """The products are not reset: no force is made of them before the next sample has made its own."""
+    component = make(**parameters())
+    d, bench = component.design, Bench(dut, component)
+    force, valid = bench.reader("force"), bench.reader("valid")
+    words = dict.fromkeys(names_of(d), 0) | {"wall_stiffness": d.stiffness.max, "wall_damping": d.damping.max}
+    deepest = {"count": (1 << (d.count_width - 1)) - 1, "velocity": d.velocity.max, **words}
+    row = {"count": 2, "velocity": -1, **words, "wall_stiffness": d.stiffness.max // 5, "wall_damping": 1}
+    expected = wall.render(d.params({name: row[name] for name in names_of(d)}), row["count"], row["velocity"])
+    for clocks in range(component.latency + 2):
+        await bench.reset()
+        bench.drive(**deepest, strobe=1)
+        await RisingEdge(dut.clk)
+        bench.drive(strobe=0)
+        await ClockCycles(dut.clk, clocks + 1)
+        await bench.reset()
+        for _ in range(component.latency + 2):
+            await RisingEdge(dut.clk)
+            assert (force(), valid()) == (0, 0), f"something is left {clocks} clocks after the strobe"
+        await bench.transact("strobe", "valid", **row)
+        assert force() == expected
 
 
 @cocotb.test()

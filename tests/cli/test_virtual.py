@@ -67,12 +67,12 @@ def test_the_serial_port_is_one_for_any_program():
 
 
 def test_a_flood_of_random_bytes_silences_no_port():
-    """2.9 MB, which the line would take half a minute of the board's time for, and none of which is a request.
+    """720 kB, which the line would take half a minute of the board's time for, and none of which is a request.
 
     The host's five tries of a second are of the board's time, too: it would give up long before the line is through.
     """
     with running(SCENE, "--tcp", "0", "--speed", "0") as board:
-        junk, port = random.Random(1).randbytes(2_900_000), os.open(board.path, os.O_RDWR | os.O_NOCTTY)
+        junk, port = random.Random(1).randbytes(720_000), os.open(board.path, os.O_RDWR | os.O_NOCTTY)
 
         def by_tcp() -> None:
             with socket.create_connection(("127.0.0.1", int(board.tcp.rpartition(":")[2])), timeout=60) as guest:

@@ -253,8 +253,8 @@ def test_every_limit_of_the_speed_is_one_that_trips(name, estimator, output):
     usual = [each for each in steps if Fraction(*each) <= largest][-1:]
     faster = [each for each in steps if Fraction(*each) > max(most, largest)]
     ends = faster if WHOLE else [*faster[:1], *faster[1:][-1:]]
-    # At an end one direction tells of the limit what the other does.
-    ways = [(1, -1)] * len(ends) if WHOLE else [(1,), (-1,)][: len(ends)]
+    # The nearest end is tried in both directions, the farthest in one.
+    ways = [(1, -1)] * len(ends) if WHOLE else [(1, -1), (-1,)][: len(ends)]
     asked = [(each, False, (1, -1)) for each in usual]
     asked += [(each, True, of) for each, of in zip(ends, ways, strict=True)]
     for (counts, samples), beyond, ways in asked:

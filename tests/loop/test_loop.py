@@ -33,7 +33,7 @@ The others are left to the long form; their blocks are held to the model anyway.
 IMPERFECT = tuple(ESTIMATORS) if LONG else ("levant u", "levant-edge u")
 """These have an encoder with errors."""
 QUICK = (*CORE, "levant-edge u") if LONG else ("levant-edge u",)
-"""These run at 1 MHz, and two of them in a wall that throws the handle back."""
+"""These run at 1 MHz, and one of them, or two in the long form, in a wall that throws the handle back."""
 A_FIFTH = {
     "protocol.settle_s": 0.14, "protocol.mean_s": 0.02, "protocol.measure_s": 0.06, "protocol.longest_s": 0.2,
     "protocol.start_m": -1e-3,

@@ -188,7 +188,7 @@ def test_words_change_from_the_next_velocity_on():
     assert plain[len(first) :].tolist() != second.tolist()
 
 
-@pytest.mark.parametrize("estimator", ["mt", "window"])
+@pytest.mark.parametrize("estimator", ["mt", "window", *(["edge-kalman"] if LONG else [])])
 def test_a_copy_goes_on_from_the_same_state(estimator):
     clocks, counts = walk(400)
     times = clocks / (RATE * CLOCKS)

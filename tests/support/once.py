@@ -17,8 +17,8 @@ def once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], obje
         make: fills an empty folder; if it fails, the next one who asks tries again.
     """
     base = factory.getbasetemp()
-    # The workers' folders are side by side.
-    common = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    # The workers' folders are side by side; a run of its own inside a worker has another name.
+    common = base.parent if base.name == f"popen-{os.environ.get('PYTEST_XDIST_WORKER')}" else base
     made = common / f"once-{name}"
     with (common / f"once-{name}.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
