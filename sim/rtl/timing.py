@@ -69,7 +69,7 @@ def _ways_ns(report: dict, netlist: dict[str, dict]) -> list[float]:
     blocks = {f"{name}_DSP": _registers(cell) for name, cell in netlist.items() if cell["type"] == "SB_MAC16"}
     behind = [name for name, halves in blocks.items() if any(halves)]
     into, out = dict.fromkeys(behind, 0.0), dict.fromkeys(behind, 0.0)
-    for net in report["detailed_net_timings"] if behind else ():
+    for net in report.get("detailed_net_timings", ()):
         for end in net["endpoints"]:
             if end["cell"] in into and re.match(r"[AB]_", end["port"]):
                 into[end["cell"]] = max(into[end["cell"]], *end["delay"])

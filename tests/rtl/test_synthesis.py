@@ -187,6 +187,19 @@ def test_a_multiplier_with_a_register_behind_it_is_part_of_a_path():
             timing.timing(part, report | rest, netlist)
 
 
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"A_REG": "1"}, r"^a multiplier for ice40-up5k has registers where its delay is not known$"),
+        (BEHIND, r"^nextpnr gives no delay into or out of the multiplier made_DSP$"),
+    ],
+)
+def test_a_board_whose_multipliers_cannot_be_timed_has_no_fmax(parameters, message, calls, monkeypatch):
+    monkeypatch.setattr(flow.Design, "cells", multiplier(**parameters))
+    with pytest.raises(SynthesisError, match=message):
+        placed(ICE40, "ice40-up5k", (6,))
+
+
 def test_a_clock_that_is_missed_is_a_result(calls):
     report = placed(load("mhz"), "ecp5-25k", (4,))
     assert (report["fmax_mhz"], report["slack_ns"], report["ok"]) == (40.0, -5.0, False)
