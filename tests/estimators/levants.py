@@ -16,6 +16,7 @@ from hardwall.model.runtime.compiled import compiled
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng
 from hardwall.testing.estimators import follow, reset_words
+from stimuli.lengths import WHOLE
 from stimuli.papers_signal import axis_at, swing
 from stimuli.seeded import seeded
 
@@ -54,8 +55,8 @@ def stimulus(d: levant.Design, samples: int) -> Iterator[tuple[int, ...]]:
         lam, way, count = (top[0], 0)[ramp // 2 % 2], (-1, 1)[ramp % 2], 0
         for k in range(d.velocity.max // alpha + 50):
             count = way * k * (fast + 1)
-            # The words of an output last, for the model runs as long as they stay.
-            yield count, int(k == 0), lam, alpha, k // 16 % 2
+            # The words of an output last in the short form, for the model runs as long as they stay.
+            yield count, int(k == 0), lam, alpha, (k if WHOLE else k // 16) % 2
         yield from ends(d, count, way, random)
     yield from led(d, samples // 4, random)
     # The least distance of the error's width alone has a magnitude beyond it: to it and beside it, in two jumps,

@@ -32,6 +32,9 @@ ERRORS = {
     "all": SCALE | LINES | DIES,
     "cable": SCALE | LINES | CABLE,
 }
+BRIEF = {"protocol.settle_s": 0.04, "protocol.mean_s": 0.01, "protocol.measure_s": 0.02}
+if LONG:
+    BRIEF = {"protocol.settle_s": 0.15, "protocol.mean_s": 0.05, "protocol.measure_s": 0.05}
 CASES = [
     (estimator, name)
     for estimator in ("levant", "kalman", "period", "levant-edge")
@@ -62,7 +65,7 @@ def test_rtl_gives_the_models_force_words_with_errors_of_scale_and_lines(estimat
 
 def test_the_loop_under_cocotb_sees_the_same_pins():
     case = Case.of("seed-2011", NEAR | ERRORS["lines"] | SCALE | {"protocol.start_m": -5e-6})
-    short = case.changed({"protocol.settle_s": 0.04, "protocol.mean_s": 0.01, "protocol.measure_s": 0.02})
+    short = case.changed(BRIEF)
     words = hit.run(short.scene, "fixed")
     assert under_cocotb(short, words.samples)["force_sha256"] == words.force_sha256
     assert words.max_force_n > 0
