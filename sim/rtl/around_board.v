@@ -1,5 +1,5 @@
 // What is around a board in simulation: its clocks, the other end of its serial line, and the amplifier of its drive
-// stage, which is that of the macro STAGE_PDM, STAGE_PWM or STAGE_DAC. Like the axis's harness it makes any number of clocks for one change of `go`, in a single evaluation.
+// stage, which is that of the macro STAGE_PDM, STAGE_PWM or STAGE_DAC. GUARDED and PERMITTED are signals inside the board. Like the axis's harness it makes any number of clocks for one change of `go`, in a single evaluation.
 //
 // Time is counted in ticks, the periods of the board's clock. The oscillator goes on where that clock stands.
 
@@ -23,7 +23,9 @@ module around_board #(
     output reg signed [63:0] given,    // the sum of the amplifier's steps at all ticks
     output reg shot,                   // both gates of a leg of a bridge have been on
     output reg [31:0] heard,           // bytes from the board, of which the last 1024 are kept
-    output [7:0] heard_byte            // the byte of that number
+    output [7:0] heard_byte,           // the byte of that number
+    output guarded,                    // a guard of `board_resting.py` is high
+    output signed [31:0] pulse         // the step of a pulse
 );
   reg tick = 0, gone = 0;
   reg [31:0] left = 0;
@@ -90,6 +92,12 @@ module around_board #(
 `else
   pdm_amplifier amplifier(.drive_pdm(drive_pdm && outputs_enable), .drive_sign(drive_sign), .steps(steps));
 `endif
+`ifdef PERMITTED
+  assign pulse = !(`PERMITTED && outputs_enable) ? 0 : drive_sign ? -1 : 1;
+`else
+  assign pulse = 0;
+`endif
+  assign guarded = `GUARDED;
   initial given = 0;
   initial shot = 0;
   always @(posedge tick) begin

@@ -7,25 +7,30 @@ Verilog, or the netlist that Yosys maps it to, with models of the cells of a fam
 
 import ctypes
 import functools
+import logging
 from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
 
 from ...hdl.axis.board import Board
-from ...hdl.export import to_verilog
+from ...hdl.export import to_netlist, to_verilog
 from ...hdl.link.link import Link
 from ...model.axis.registers import RegisterMap
 from ...model.drive import dac
 from ...model.spec import AxisSpec
-from . import netlist, shared_library
+from . import board_ports, board_resting, netlist, shared_library
+from .board_resting import BoardResting
 from .families import FAMILIES
+from .resting import RestsNotError
 from .shared_library import Recipe
 from .verilated import Rtl, RtlState
 
-AROUND, AMPLIFIERS, SHIM = (
-    Path(__file__).with_name(name) for name in ("around_board.v", "amplifiers.v", "board_library.cpp")
+AROUND, AMPLIFIERS, SHIM, RESTING = (
+    Path(__file__).with_name(name)
+    for name in ("around_board.v", "amplifiers.v", "board_library.cpp", "board_resting.h")
 )
+logger = logging.getLogger(__name__)
 OSCILLATOR_HZ = 2.4e6
 """About the frequency of the oscillator beside the clock; the clock has a whole number of it in every half period."""
 ROOM = 1024
@@ -65,12 +70,26 @@ def build(spec: AxisSpec, baud: int | None = None, family: str | None = None) ->
     around |= of_dac(spec)
     options = ("--top-module", "around_board", *(f"-G{name}={value}" for name, value in around.items()))
     options += (f"-DSTAGE_{spec.stage.name.upper()}",)
-    if family is not None:
+    rest = None
+    if family is None:
+        rest = _resting(board)
+    else:
         mapped = netlist.mapped(board, FAMILIES[family], "board")
         verilog, options = f"{mapped.gates}\n{mapped.models}", (*options, *netlist.OPTIONS)
-    ours = {path.name: path.read_text(encoding="utf-8") for path in (AROUND, AMPLIFIERS, SHIM)}
-    files = {"board.v": verilog, **ours}
-    return shared_library.build(Recipe(files, SHIM.name, "Vboard", options))
+    header = board_ports.header(spec, rest, around["OSCILLATOR_CLOCKS"])
+    files = {"board.v": verilog, board_ports.HEADER: header}
+    files |= {path.name: path.read_text(encoding="utf-8") for path in (AROUND, AMPLIFIERS, SHIM, RESTING)}
+    options += board_ports.options(rest)
+    return shared_library.build(Recipe(files, SHIM.name, "Vboard", options, members=board_ports.members(rest)))
+
+
+def _resting(board: Board) -> BoardResting | None:
+    """Return how a board rests; None, with a warning, if none of its clocks can be left out."""
+    try:
+        return board_resting.check(to_netlist(board, "board"))
+    except RestsNotError as error:
+        logger.warning(f"the virtual board runs every clock, for {error}")
+    return None
 
 
 def of_dac(spec: AxisSpec) -> dict[str, int]:
@@ -120,7 +139,7 @@ class BoardHardware:
         self._library = library = ctypes.CDLL(str(self._library_at()))
         library.board_open.restype = ctypes.c_void_p
         library.board_open.argtypes = [ctypes.c_int64, ctypes.c_int64, ctypes.c_double]
-        library.board_take.restype = library.board_waiting.restype = ctypes.c_int64
+        library.board_take.restype = library.board_waiting.restype = library.board_evaluated.restype = ctypes.c_int64
         library.board_waiting.argtypes = [ctypes.c_void_p]
         for name in ("board_send", "board_take"):
             getattr(library, name).argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64]
@@ -147,6 +166,15 @@ class BoardHardware:
         """Return what the board has sent since the last call."""
         count = self._library.board_take(self._context, self._heard.ctypes.data, ROOM)
         return self._heard[:count].tobytes()
+
+    def skip_nothing(self) -> None:
+        """Evaluate every clock from here on."""
+        self._library.board_skip_nothing(ctypes.c_void_p(self._context))
+
+    @property
+    def evaluated(self) -> int:
+        """How many clocks were evaluated since it was opened; the others were skipped."""
+        return self._library.board_evaluated(ctypes.c_void_p(self._context))
 
     @property
     def shot(self) -> bool:

@@ -33,8 +33,9 @@ Two values follow from a counter. Its successor differs from clock to clock. The
 of the skipped clocks.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 from amaranth.hdl import _nir as nir
 
@@ -85,10 +86,12 @@ def check(netlist: nir.Netlist, shown: Iterable[str], listed: Iterable[str] = CO
     Raises:
         RestsNotError: if a counter reaches what it must not.
     """
-    return _Check(netlist, tuple(listed)).run(tuple(shown))
+    return NetlistCheck(netlist, tuple(listed)).run(tuple(shown))
 
 
-class _Check:
+class NetlistCheck:
+    """What a netlist's registers follow from: the counters `listed` reach nothing but what may see them."""
+
     def __init__(self, netlist: nir.Netlist, listed: tuple[str, ...]):
         self._netlist, self._cells = netlist, netlist.cells
         self._names: dict[nir.Value, list[str]] = {}
@@ -114,15 +117,18 @@ class _Check:
         for name in shown:
             self._decides(f"the output {name}", self._netlist.top.ports_o[name])
         at_once = not (self._loaded or self._latched(shown))
-        counters = tuple(
+        return Resting(self._found(with_fixed=at_once), 1 if at_once else 2)
+
+    def _found(self, with_fixed: bool) -> tuple[Counter, ...]:
+        """Return the counters with their stops, and if asked for with the values below the constants that they take."""
+        return tuple(
             Counter(
                 tuple(self._names[value]),
                 len(value),
-                tuple(sorted(self._stops[number] | (self._fixed[number] if at_once else set()))),
+                tuple(sorted(self._stops[number] | (self._fixed[number] if with_fixed else set()))),
             )
             for number, value in self._counters.items()
         )
-        return Resting(counters, 1 if at_once else 2)
 
     def _latched(self, shown: tuple[str, ...]) -> bool:
         """Return whether anything that the shown outputs follow from takes a counter."""
@@ -150,16 +156,15 @@ class _Check:
 
     def _made_of_counters(self) -> set[nir.Net]:
         """Return the nets that follow from counters without a register between, but for the bits of stops."""
-        users: dict[int, set[int]] = {}
-        for number, cell in enumerate(self._cells[1:], 1):
-            for net in cell.input_nets():
-                users.setdefault(net.cell if net.is_cell else 0, set()).add(number)
-        made = {net for value in self._counters.values() for net in value}
-        waiting = list(self._counters)
+        return self._followers({net for value in self._counters.values() for net in value}, self._is_stop)
+
+    def _followers(self, nets: set[nir.Net], ends: Callable[[nir.Cell], bool] = lambda cell: False) -> set[nir.Net]:
+        """Return some nets, and those that follow from them without a register between, nor a cell that `ends` it."""
+        made, waiting = set(nets), list({net.cell for net in nets})
         while waiting:
-            for number in users.get(waiting.pop(), ()):
+            for number in self._users.get(waiting.pop(), ()):
                 cell = self._cells[number]
-                if isinstance(cell, nir.FlipFlop | nir.SyncReadPort) or self._is_stop(cell):
+                if isinstance(cell, nir.FlipFlop | nir.SyncReadPort) or ends(cell):
                     continue
                 new = {
                     net
@@ -171,13 +176,22 @@ class _Check:
                     waiting.append(number)
         return made
 
+    @cached_property
+    def _users(self) -> dict[int, set[int]]:
+        """The cells that use an output of a cell, by its number."""
+        users: dict[int, set[int]] = {}
+        for number, cell in enumerate(self._cells[1:], 1):
+            for net in cell.input_nets():
+                users.setdefault(net.cell if net.is_cell else 0, set()).add(number)
+        return users
+
     def _is_stop(self, cell: nir.Cell) -> bool:
         """Return whether a cell compares a counter with a constant, which is then one of its stops."""
         if not isinstance(cell, nir.Operator) or cell.operator not in ("==", "!="):
             return False
         for value, other in (cell.inputs, cell.inputs[::-1]):
             for number, counter in self._counters.items():
-                if other.is_const and value == _extended(counter, len(value)):
+                if other.is_const and value == extended(counter, len(value)):
                     self._stops[number].add(_constant(other))
                     return True
         return False
@@ -232,13 +246,17 @@ class _Check:
     def _taken(self, number: int, value: nir.Value) -> None:
         """Raise RestsNotError unless every way to the data of a register is one that the argument allows."""
         made = [net for net in value if net in self._made]
-        if not made or any(counter[0] in made for counter in self._counters.values()):
+        if not made or self._shows(made):
             return
         ways = self._ways(number, value)
         if ways is None:
             raise RestsNotError(f"{self._name(number)} takes what is computed from a counter")
         for way in ways:
             self._taken(number, way)
+
+    def _shows(self, made: list[nir.Net]) -> bool:
+        """Return whether a register that takes some nets cannot be the same at two clocks that are looked at."""
+        return any(counter[0] in made for counter in self._counters.values())
 
     def _next(self, number: int, value: nir.Value) -> None:
         """Raise RestsNotError unless every way to the next value of a counter is one that the argument allows."""
@@ -263,7 +281,7 @@ class _Check:
             return False
         one, width = nir.Value.from_const(1, cell.width), len(value)
         sums = nir.Value(nir.Net.from_cell(value[0].cell, bit) for bit in range(width))
-        counted = [_extended(counter, cell.width), one]
+        counted = [extended(counter, cell.width), one]
         return value == sums and list(cell.inputs) in (counted, counted[::-1])
 
     def _name(self, number: int) -> str:
@@ -276,7 +294,7 @@ class _Check:
         return min(self._names.get(value, ["a register"]), key=len)
 
 
-def _extended(value: nir.Value, width: int) -> nir.Value:
+def extended(value: nir.Value, width: int) -> nir.Value:
     """Return a value with zeros above it, so that it has some bits."""
     return nir.Value([*value, *nir.Value.zeros(max(width - len(value), 0))])
 

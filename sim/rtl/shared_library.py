@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import re
 import shutil
 from dataclasses import dataclass
 from functools import partial
@@ -38,6 +39,8 @@ class Recipe:
         prefix: the name of the class that Verilator makes.
         options: options of Verilator beside `OPTIONS`.
         optimisation: option of the C++ compiler.
+        members: a regular expression; of the members of the class whose names have a part of it, `members.h` makes a
+            list for the shim, MEMBERS.
     """
 
     files: dict[str, str]
@@ -45,6 +48,7 @@ class Recipe:
     prefix: str
     options: tuple[str, ...]
     optimisation: str = FAST_TO_RUN
+    members: str = ""
 
 
 def build(recipe: Recipe) -> Path:
@@ -56,7 +60,8 @@ def build(recipe: Recipe) -> Path:
         BuildError: if the build fails.
     """
     rules, options = RULES.read_text(encoding="utf-8"), (*OPTIONS, "--prefix", recipe.prefix, *recipe.options)
-    content = "\0".join([rules, *recipe.files.values(), version("verilator"), *options, recipe.optimisation])
+    made_by = [version("verilator"), *options, recipe.optimisation, recipe.members]
+    content = "\0".join([rules, *recipe.files.values(), *made_by])
     folder = build_dir() / "rtl" / hashlib.sha256(content.encode()).hexdigest()[:16]
     return whole_folder(folder, partial(_verilate, recipe, rules)) / LIBRARY
 
@@ -79,6 +84,8 @@ def _verilate(recipe: Recipe, rules: str, work: Path) -> None:
     ]
     with stage("building the hardware with Verilator, once"):
         for command in commands:
+            if recipe.members and command[0] == "make":
+                _list_members(work / "obj", recipe)
             try:
                 done = children.run(command, cwd=work, env=environment(), capture_output=True, text=True)
             except OSError as error:
@@ -90,3 +97,11 @@ def _verilate(recipe: Recipe, rules: str, work: Path) -> None:
                 raise BuildError(f"the Verilated library could not be built: {why}; see {shown_path(log)}")
     shutil.move(work / "obj" / LIBRARY, work / LIBRARY)
     shutil.rmtree(work / "obj")
+
+
+def _list_members(folder: Path, recipe: Recipe) -> None:
+    """Write the list of the members of Verilator's class that the shim asks for."""
+    made = (folder / f"{recipe.prefix}___024root.h").read_text(encoding="utf-8")
+    found = re.findall(rf"\b(\w*(?:{recipe.members})\w*)[;,)]", made)
+    lines = "".join(f" MEMBER({name})" for name in dict.fromkeys(found))
+    (folder / "members.h").write_text(f"#define MEMBERS{lines}\n", encoding="utf-8")

@@ -249,6 +249,31 @@ def test_an_answer_comes_after_the_time_of_its_bits_and_the_device(first, count,
     assert line_s - 1 / BAUD < took_s < line_s + DEVICE_CLOCKS / SCENE["controller.clock_hz"] + 2 * STEP_S
 
 
+@pytest.mark.parametrize("stage", ["", *(STAGES if LONG else [])])
+def test_a_contact_is_the_same_where_clocks_are_left_out(stage):
+    found = []
+    for skips in (False, True):
+        with VirtualBoard(load("seed-2011", SCENE | FINE | STAGES.get(stage, {}))) as board:
+            if not skips:
+                board.hardware.skip_nothing()
+            host, handles = SerialHost(board), []
+            host.write_si("supervisor_ramp", 2000.0)
+            host.bring_up(STIFFNESS_N_PER_M, DAMPING_N_S_PER_M, WALL_M)
+            board.hand.held_m = 3e-3
+            for _ in range(4):
+                host.beat()
+                for _ in range(25):
+                    board.run()
+                    handles.append(board.handle)
+            state = [host.request(frames.read(address, 100)) for address in (0x20, 0x60, 0x80)]
+            found.append((handles, state, host.read("state"), board.hardware.evaluated))
+    (handles, *told, state, every), (same_handles, *same_told, same_state, some) = found
+    assert (same_handles, same_told, same_state) == (handles, told, state)
+    assert state == ARMED
+    assert min(handle.force_n for handle in handles) < -1.0
+    assert (some < 0.8 * every) == (stage != "pwm")
+
+
 @long_form
 @pytest.mark.parametrize("netlist", FAMILIES)
 def test_a_netlist_does_what_its_verilog_does(netlist):
