@@ -29,7 +29,12 @@ TOOLS = {"cd", "cp", "dask", "fusesoc", "git", "mkdir", "pip", "pytest", "python
 MANY_COMMANDS = (
     *("docs/guide/axes.md", "docs/guide/estimator.md", "docs/guide/speed.md"),
     *("docs/reference/estimators.md", "docs/reference/hardware.md", "docs/reference/scenes.md"),
-    *("docs/reference/virtual.md", "docs/results/higher-order.md", "docs/results/rendered.md"),
+    *(
+        "docs/reference/host.md",
+        "docs/reference/virtual.md",
+        "docs/results/higher-order.md",
+        "docs/results/rendered.md",
+    ),
     # Another page shows the README's hit, too.
     *("docs/results/response.md", "README.md"),
 )
