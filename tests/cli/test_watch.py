@@ -61,7 +61,7 @@ def test_what_a_silent_board_misses_is_said(virtual, tmp_path):
     file = tmp_path / "log.csv"
     with started(HARDWALL, "watch", virtual.path, "--rate", RATE_HZ, "--csv", file, *AT) as process:
         wait_until(lambda: file.exists() and len(rows_of(file)) > 3)
-        virtual.order("drop 1000")
+        virtual.order("drop 400")
         wait_until(lambda: any(not row["state"] for row in rows_of(file)))
         virtual.order("drop 1")
         wait_until(lambda: rows_of(file)[-1]["state"])
