@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterable, Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -18,6 +19,7 @@ ROOT = Path(__file__).absolute().parent.parent
 ROOMS = ("cli", "hdl", "host", "model", "sim")
 SOURCES = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
+TEST_FILES = frozenset(TESTS)
 # The folders of sim/: every folder imports only from those before it, and only `rtl` imports hdl. Nothing imports cli/.
 FLOORS = (
     "world",
@@ -97,8 +99,13 @@ def package_of(requirement: str) -> str:
     return re.match(r"[\w-]+", requirement)[0]
 
 
-def imports(path: Path) -> Iterator[str]:
-    """Yield the absolute name of every module that a source imports, at any depth, and of every name that it takes."""
+@cache
+def imports(path: Path) -> tuple[str, ...]:
+    """Return the absolute name of every module that a source imports, at any depth, and of every name that it takes."""
+    return tuple(_imports(path))
+
+
+def _imports(path: Path) -> Iterator[str]:
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -355,19 +362,24 @@ def test_the_lock_has_a_version_in_every_range_with_its_hashes_and_no_address():
     assert {name for name, span in bounds.items() if not extras._within(locked.get(plain(name), "0"), span)} == set()
 
 
+@cache
+def ours() -> frozenset[str]:
+    """Return the first names of what the project's own files import of each other."""
+    docs = ROOT / "docs"
+    pages = (page.relative_to(docs).parts[0].removesuffix(".py") for page in docs.rglob("*.py"))
+    return frozenset({"hardwall", *pages, *(test.stem for test in TESTS), *(test.parent.name for test in TESTS)})
+
+
 @pytest.mark.parametrize("path", [*SOURCES, *TESTS], ids=identity)
 def test_what_is_imported_is_what_its_extra_installs(path):
-    for_tests = path in TESTS or path.stem.startswith("cocotb_")
+    for_tests = path in TEST_FILES or path.stem.startswith("cocotb_")
     room = path.relative_to(ROOT).parts[0]
     of_room = {"model": [], "host": ["host", "panel"], "cli": ["sim", "host"]}
     of_it = of_room.get(room, ["sim", "data", "host", "panel", "testing", "test"] if for_tests else ["sim", "data"])
     lists = [CONFIG["project"]["dependencies"], *(EXTRAS[extra] for extra in of_it)]
     installed = {plain(package_of(requirement)) for one in lists for requirement in one}
     installed.add("llvmlite")  # a dependency of Numba
-    docs = ROOT / "docs"
-    pages = (page.relative_to(docs).parts[0].removesuffix(".py") for page in docs.rglob("*.py"))
-    ours = {"hardwall", *pages, *(test.stem for test in TESTS), *(test.parent.name for test in TESTS)}
-    foreign = {name.partition(".")[0] for name in imports(path)} - ours - set(sys.stdlib_module_names)
+    foreign = {name.partition(".")[0] for name in imports(path)} - ours() - set(sys.stdlib_module_names)
     assert {name for name in foreign if not installed & {plain(each) for each in PROVIDERS.get(name, [])}} == set()
 
 

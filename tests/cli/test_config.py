@@ -15,6 +15,7 @@ from hardwall.model.axis.registers import RegisterMap
 from hardwall.model.register import Register
 from hardwall.sim.scene.load import load
 from hardwall.testing import rng
+from stimuli.lengths import LONG
 from support.command_line import call
 from support.processes import HARDWALL, PATIENCE_S
 from support.virtual_boards import PACE, SCENE, VirtualBoard, running
@@ -110,7 +111,9 @@ def asked(words: list[object], answer: str, folder: object) -> tuple[int, str]:
         os.close(slave)
 
 
-@pytest.mark.parametrize(("answer", "code", "loaded"), [("y", 0, True), ("n", 1, False), ("", 1, False)])
+@pytest.mark.parametrize(
+    ("answer", "code", "loaded"), [("y", 0, True), ("", 1, False), *([("n", 1, False)] if LONG else [])]
+)
 def test_a_terminal_is_asked(virtual, config, tmp_path, answer, code, loaded):
     put(virtual, {"wall_stiffness": 0})
     assert config("save")[0] == 0
