@@ -1,6 +1,26 @@
 """Ways of a handle under a drive, and the energy that a passivity controller's observer sees on them."""
 
+import numpy as np
+import pytest
+
 from hardwall.model.axis import passivity
+from hardwall.sim.scene.schema import Scene
+from hardwall.sim.walls import hit
+from hardwall.sim.walls.hit_statistics import Tally
+
+
+def positions(scene: Scene, backend: str) -> np.ndarray:
+    """Return the position at every sample of a hit, m, by the loop that keeps no traces."""
+    kept, add = [], Tally.add
+
+    def added(tally: Tally, first: int, some: np.ndarray, drives: np.ndarray) -> None:
+        kept.append(some.copy())
+        add(tally, first, some, drives)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Tally, "add", added)
+        hit.run(scene, backend)
+    return np.concatenate(kept)
 
 
 def energies(params: passivity.Params, counts: list[int], drives: list[int]) -> list[int]:
