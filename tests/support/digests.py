@@ -168,7 +168,7 @@ def _estimates() -> Iterator[Case]:
         for backend in ("float", "fixed"):
             arguments = ("accuracy", "--estimators", estimator, "--rates", "1e4,1e5", "--backend", backend)
             arguments += ("--signal", "stop", "--signal", "flicker", "--workers", "1", "--json")
-            short = estimator == "levant" or (estimator in FEW and backend == "fixed")
+            short = estimator == "levant" or (estimator in HIT and backend == "fixed")
             yield Case(f"accuracy/{estimator}/{backend}", arguments, rows, short)
     for estimator in FEW:
         for backend in ("float", "fixed", "rtl"):
