@@ -14,7 +14,7 @@ from hardwall.sim.world.converter import AS_IT_IS, Converter, Pulse
 from hardwall.sim.world.device import Device, Hand, Motor, Shunt, Transmission, train
 from hardwall.sim.world.rigid import Rigid
 from hardwall.sim.world.taylor import Train
-from stimuli.handle_paths import positions
+from stimuli.handle_paths import path_of
 from stimuli.scenes import AMPLIFIER, CABLE, DRIVE, HAND, ONE_SECOND, PULSES, SHUNT
 
 
@@ -79,7 +79,7 @@ def test_coarse_steps_of_the_output_are_felt():
     """A push that a coarse converter rounds off moves nothing; fine steps move the handle as without a converter."""
 
     def start(changes):
-        return positions(load("seed-2011", ONE_SECOND | changes), "fixed")[:3000]
+        return path_of(load("seed-2011", ONE_SECOND | changes), "fixed")[0][:3000]
 
     exact = start({})
     assert np.ptp(start({"output.full_scale_n": 32.0, "output.dac_bits": 6})) == 0.0

@@ -9,18 +9,19 @@ from hardwall.sim.walls import hit
 from hardwall.sim.walls.hit_statistics import Tally
 
 
-def positions(scene: Scene, backend: str) -> np.ndarray:
-    """Return the position at every sample of a hit, m, by the loop that keeps no traces."""
+def path_of(scene: Scene, backend: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return position (m) and drive (force LSB) at every sample of a hit, by the loop that keeps no traces."""
     kept, add = [], Tally.add
 
-    def added(tally: Tally, first: int, some: np.ndarray, drives: np.ndarray) -> None:
-        kept.append(some.copy())
-        add(tally, first, some, drives)
+    def added(tally: Tally, first: int, positions: np.ndarray, drives: np.ndarray) -> None:
+        kept.append((positions.copy(), drives.copy()))
+        add(tally, first, positions, drives)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Tally, "add", added)
         hit.run(scene, backend)
-    return np.concatenate(kept)
+    positions, drives = map(np.concatenate, zip(*kept, strict=True))
+    return positions, drives
 
 
 def energies(params: passivity.Params, counts: list[int], drives: list[int]) -> list[int]:
