@@ -6,14 +6,18 @@ import pytest
 
 from hardwall.model.estimators.registry import ESTIMATORS
 from hardwall.model.record_axis import DECODER_CLOCKS
+from hardwall.model.record_time import RecordTime
+from hardwall.model.spec import AxisSpec
 from hardwall.sim.estimates.replay import replay
-from hardwall.sim.estimates.replay_plan import ArgumentError
-from hardwall.sim.estimates.settings import SettingError, Settings, names_of, settings_of
+from hardwall.sim.estimates.replay_plan import ArgumentError, plan
+from hardwall.sim.estimates.settings import SettingError, Settings, in_counts, names_of, settings_of
 from stimuli.lengths import LONG
 from stimuli.replays import BOUND, COARSEN, recording, swing
 
-OF_RATES = [(name, 333.0) for name in ESTIMATORS] + [(name, 1000.0) for name in (ESTIMATORS if LONG else ["levant"])]
-"""Every estimator at a rate that no power of two divides; by `make soak` also at one of whole milliseconds."""
+RATES = 333.0, 1000.0
+"""One that no power of two divides, and one of whole milliseconds."""
+OF_RATES = [(name, rate) for name in (ESTIMATORS if LONG else ["levant", "levant-edge"]) for rate in RATES]
+"""What runs: every estimator by `make soak`, and else one of counts and one of stamps."""
 
 
 @pytest.mark.parametrize(("estimator", "rate"), OF_RATES)
@@ -21,11 +25,31 @@ def test_the_gains_of_a_report_can_be_given_back(estimator, rate):
     """Units and powers of time are those of the report: the words are the same, to the last."""
     made = recording(swing().counts, rate)
     derived = replay(made, estimator, coarsen=COARSEN)
-    assert list(derived.gains) == list(names_of(estimator))
-    changes = {f"controller.gains.{estimator}.{name}": value for name, value in derived.gains.items()}
-    given = replay(made, estimator, coarsen=COARSEN, settings=settings_of(changes, estimator))
+    given = replay(made, estimator, coarsen=COARSEN, settings=given_back(estimator, derived.gains))
     assert given.gains == pytest.approx(derived.gains, rel=1e-12)
     assert given.velocity_sha256 == derived.velocity_sha256
+
+
+def gains_of(spec: AxisSpec, rate: float) -> dict[str, float]:
+    """Return the gains of an axis, in counts and true seconds."""
+    return {in_counts(name): value for name, value in RecordTime(rate).named(spec.design.gains).items()}
+
+
+def given_back(estimator: str, gains: dict[str, float]) -> Settings:
+    """Return the settings of the gains of a report."""
+    assert list(gains) == list(names_of(estimator))
+    return settings_of({f"controller.gains.{estimator}.{name}": value for name, value in gains.items()}, estimator)
+
+
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_the_gains_of_a_report_give_the_words_of_its_axis(estimator, rate):
+    made = recording(swing().counts, rate)
+    derived = plan(made, estimator, "fixed", COARSEN).spec
+    gains = gains_of(derived, rate)
+    given = plan(made, estimator, "fixed", COARSEN, settings=given_back(estimator, gains)).spec
+    assert gains_of(given, rate) == pytest.approx(gains, rel=1e-12)
+    assert given.design.estimator.words == derived.design.estimator.words
 
 
 def test_gains_change_the_words_and_the_report():
@@ -82,7 +106,7 @@ def test_settings_that_are_refused(changes, said):
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_a_bound_that_sets_no_gain_of_an_estimator_is_refused(estimator):
     """It was taken, and changed nothing."""
-    spec = replay(swing(), estimator, coarsen=COARSEN, acceleration_max_counts_per_s2=BOUND).spec
+    spec = plan(swing(), estimator, "fixed", COARSEN, BOUND).spec
     for name, field, value in (
         ("jerk_max_counts_per_s3", "jerk_max_m_per_s3", 1.0),
         ("edge_error_max_counts", "edge_error_max_counts", 1e-3),
@@ -119,8 +143,9 @@ def test_gains_that_no_axis_has_are_refused():
 )
 def test_a_sample_has_clocks_for_the_longer_path_of_given_gains(estimator, gain, factor):
     """The clocks of a sample were chosen for the derived gains, before whose drive no edge of the next sample came."""
-    derived = replay(swing(), estimator, None, "fixed", COARSEN, BOUND)
-    gains = {name: value * (factor if name == gain else 1) for name, value in derived.gains.items()}
-    spec = replay(swing(), estimator, None, "fixed", COARSEN, BOUND, settings=Settings(gains)).spec
+    made = swing()
+    derived = plan(made, estimator, "fixed", COARSEN, BOUND).spec
+    gains = {name: value * (factor if name == gain else 1) for name, value in gains_of(derived, made.rate_hz).items()}
+    spec = plan(made, estimator, "fixed", COARSEN, BOUND, Settings(gains)).spec
     needed = spec.design.latency_to_drive + DECODER_CLOCKS
-    assert derived.spec.clocks_per_sample < needed <= spec.clocks_per_sample
+    assert derived.clocks_per_sample < needed <= spec.clocks_per_sample

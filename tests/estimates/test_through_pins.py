@@ -20,7 +20,7 @@ from stimuli.outputs import EVERY_OUTPUT
 from stimuli.replays import BOUND, COARSEN, recording, swing
 
 # One estimator on the count, with a memory, and one on the stamps; by `make soak` all.
-KINDS = [("window", "u"), ("levant-edge", "u")]
+KINDS = [("levant", "u"), ("levant-edge", "u")]
 SOME = pytest.mark.parametrize(("estimator", "output"), EVERY_OUTPUT if LONG else KINDS)
 
 

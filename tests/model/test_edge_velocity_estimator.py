@@ -20,8 +20,8 @@ from hardwall.testing import rng
 from stimuli.lengths import LONG
 
 EVERY = [(name, backend) for name in sorted(ESTIMATORS) for backend in ("fixed", "float")]
-SOME = EVERY if LONG else [("edge-kalman", "float"), ("levant", "fixed"), ("mt", "fixed")]
-SOME_ACCELERATED = [("levant-edge", "fixed"), ("kalman", "float")]
+SOME = EVERY if LONG else [("period", "float"), ("levant", "fixed"), ("mt", "fixed")]
+SOME_ACCELERATED = [("edge-kalman", "fixed"), ("kalman", "float")]
 if LONG:
     SOME_ACCELERATED = [(name, backend) for name, backend in EVERY if issubclass(ESTIMATORS[name], Accelerated)]
 RATE, CLOCKS = 1000.0, 1 << 17

@@ -24,7 +24,7 @@ COUNT_M = 2.0**-20
 SPEC = replace(spec("paper", "fdm"), count_m=COUNT_M, actuation_hz=PAPER["sample_hz"])
 EVERY = [(name, backend) for name in ESTIMATORS for backend in ("fixed", "float")]
 SOME = EVERY if LONG else [("levant", "float"), ("edge-kalman", "fixed")]
-SOME_ACCELERATED = [("edge-kalman", "fixed"), ("levant-2", "float")]
+SOME_ACCELERATED = [("edge-kalman", "fixed")]
 if LONG:
     SOME_ACCELERATED = [(name, backend) for name, backend in EVERY if issubclass(ESTIMATORS[name], Accelerated)]
 WALL = {"wall_stiffness": 20e3, "wall_damping": 10.0, "encoder_glitch_clocks": 1}

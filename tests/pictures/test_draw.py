@@ -168,9 +168,10 @@ def test_letters_are_large_enough_to_read(picture):
 @pytest.mark.parametrize(
     ("name", "suffix"),
     [
-        ("hit", ".png"),
-        ("figure 2", ".svg"),
-        ("zwidth", ".pdf"),
+        ("bits", ".png"),
+        ("bits", ".svg"),
+        ("bits", ".pdf"),
+        *([("hit", ".png"), ("figure 2", ".svg"), ("zwidth", ".pdf")] if LONG else ()),
         *([("zwidth", ".png"), ("zwidth", ".svg"), ("trade", ".svg")] if LONG else ()),
     ],
 )

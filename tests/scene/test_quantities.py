@@ -27,6 +27,8 @@ BRIEF = {
 LEFT_OUT = {("handle.coulomb_n", 0.0), ("amplifier.delay_s", 0.0)}
 BASES = {"seed-2011": ("seed-2011", {}), "drive-2011": ("drive-2011", {}), "bristles": ("seed-2011", LUGRE_KEYS)}
 """Scenes by name, with what is changed first."""
+BACKENDS = dict.fromkeys(BASES if LONG else ["seed-2011"], ("float", "fixed"))
+"""The scenes that run on both models. The device is in float64 on both; each has its own loop to compile."""
 HELD = {"handle.coulomb_n", "presliding.static_n", "protocol.push_n"}
 """Keys of the handle's friction, and of what overcomes it."""
 
@@ -53,7 +55,7 @@ def run(base: str, changes: dict[str, float]) -> list[hit.Hit]:
     name, first = BASES[base]
     try:
         scene = load(name, BRIEF | first | changes)
-        found = [hit.run(scene, backend) for backend in ("float", "fixed")]
+        found = [hit.run(scene, backend) for backend in BACKENDS.get(base, ("fixed",))]
     except (SceneError, RuntimeError) as refusal:
         told, found = str(refusal), []
     if not found:

@@ -28,6 +28,10 @@ COUPLING = {
     "coupling.sample_hz": 1_000,
 }  # fmt: skip
 """A tool of 50 g that a host simulates a thousand times a second."""
+NARROW = {
+    "controller.clock_hz": 1_000_000, "controller.speed_max_m_per_s": 0.02, "controller.glitch_clocks": 1,
+}  # fmt: skip
+"""An axis of `seed-2011` with few clocks a sample, which several tests build."""
 ODD = {"controller.sample_hz": 11_000, "controller.clock_hz": 9_900_000}
 SHORT_OF_AXES = {
     "protocol.settle_s": 0.02,

@@ -11,6 +11,7 @@ from hardwall.sim.studies.fit import MEAN, PARAMETERS
 from hardwall.sim.walls.methods import methods
 from hardwall.sim.walls.zwidth import Map
 from stimuli.known_device import DELAY_S, MASS_KG, NAMES, KnownDevice, verdict
+from stimuli.lengths import LONG
 from support.command_line import call
 
 PROPOSED = methods()["proposed"].label
@@ -74,7 +75,8 @@ def test_the_facts_of_a_known_device_depend_on_what_moves_its_maps():
 
 def test_report_and_table_and_what_is_known_is_not_hit_again(monkeypatch, capsys):
     monkeypatch.setattr("hardwall.sim.walls.mapping.verdict", verdict)
-    coarse = [word for key in ("stiffness_step_n_per_m=10e3", "damping_step_n_s_per_m=49") for word in ("--set", key)]
+    steps = ("stiffness_step_n_per_m=10e3", "damping_step_n_s_per_m=49" if LONG else "damping_step_n_s_per_m=98")
+    coarse = [word for key in steps for word in ("--set", key)]
     words = ["assumptions", "seed-2011", "--workers", 1, *(w if w == "--set" else f"zwidth.{w}" for w in coarse)]
     code, out, _ = call(monkeypatch, capsys, *words, "--json")
     assert code == 0

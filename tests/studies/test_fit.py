@@ -12,6 +12,7 @@ from hardwall.sim.walls.figure_5 import Fact
 from hardwall.sim.walls.mapping import NeverReached
 from hardwall.sim.walls.zwidth import Map
 from stimuli.known_device import DELAY_S, MASS_KG, NAMES, KnownDevice, verdict
+from stimuli.lengths import LONG
 from support.command_line import call
 
 
@@ -85,6 +86,9 @@ def test_what_lacks_least_beside_the_others_is_what_stood_in_the_way():
 
 def test_report_and_table_and_what_is_known_is_not_hit_again(monkeypatch, capsys):
     monkeypatch.setattr("hardwall.sim.walls.mapping.verdict", verdict)
+    if not LONG:
+        monkeypatch.setattr(fit, "FULL", fit.COARSE)
+        monkeypatch.setattr(fit, "FINALISTS", 2)
     words = ["fit", "--axis", "3-30", "--evaluations", 24, "--workers", 1]
     code, out, _ = call(monkeypatch, capsys, *words, "--json")
     assert code == 0

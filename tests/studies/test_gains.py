@@ -207,7 +207,8 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(gains, "ALPHAS", np.array([1.0, 4.0]))
     monkeypatch.setattr(gains, "HALVINGS", 3 if LONG else 1)
     picture = tmp_path / "gains.svg"
-    code, out, _ = call(monkeypatch, capsys, "gains", *SET, "--workers", 1, "--json", "--plot", picture)
+    order = ["gains", *SET, "--workers", 1, "--starts", 3 if LONG else 1]
+    code, out, _ = call(monkeypatch, capsys, *order, "--json", "--plot", picture)
     assert code == 0
     report = json.loads(out)
     assert report["c_m_per_s2"] == BOUND
@@ -229,7 +230,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
         "seed-2011",
     )
     assert [label for label in wanted if label not in text] == []
-    code, out, _ = call(monkeypatch, capsys, "gains", *SET, "--workers", 1, "--resume")
+    code, out, _ = call(monkeypatch, capsys, *order, "--resume")
     assert code == 0
     assert "best in place" in out
 

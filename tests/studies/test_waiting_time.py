@@ -9,21 +9,23 @@ import pytest
 from hardwall.sim.scene.load import read
 from hardwall.sim.studies import waiting_time
 from hardwall.sim.studies.waiting_time import SCENE, Command, Wait
+from stimuli.lengths import LONG
 from support.command_line import call
 
 AT_THE_WALL = ("--set", "protocol.start_m=-1e-5")
 HIT = ("hit", SCENE, *AT_THE_WALL, *waiting_time.SHORTER, "--json")
+ROUNDS = 2 if LONG else 1
 
 
 def test_two_versions_are_timed_in_turns(monkeypatch, capsys):
     """The other is one that is installed. Neither compiles, which would take longer than all else."""
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
-    monkeypatch.setattr(waiting_time, "COMMANDS", {"fixed (samples/s)": Command(HIT, 2, speed=True)})
+    monkeypatch.setattr(waiting_time, "COMMANDS", {"fixed (samples/s)": Command(HIT, ROUNDS, speed=True)})
     other = waiting_time.program_of(Path(sys.executable).parents[1])
     said: list[str] = []
     (wait,) = waiting_time.measure(read("seed-2011"), other, said.append)
-    assert said == [f"round {number} of 2: fixed (samples/s)" for number in (0, 1, 2)]
-    assert len(wait.here) == len(wait.other) == 2
+    assert said == [f"round {number} of {ROUNDS}: fixed (samples/s)" for number in range(ROUNDS + 1)]
+    assert len(wait.here) == len(wait.other) == ROUNDS
     assert waiting_time.table([wait]).rows[0][0] == "fixed (samples/s)"
 
 
@@ -50,7 +52,7 @@ def test_a_command_that_an_older_version_refuses_has_no_ratio(tmp_path, monkeypa
     other, calls = tmp_path / "hardwall", tmp_path / "calls"
     other.write_text(f"#!/bin/sh\necho called >> {calls}\nexit 2\n")
     other.chmod(0o755)
-    command = Command(HIT, 1, speed=True, lately=True)
+    command = Command(HIT, 1, speed=True, cold=not LONG, lately=True)
     monkeypatch.setattr(waiting_time, "COMMANDS", {"fixed (samples/s)": command})
     (wait,) = waiting_time.measure(read("seed-2011"), other, lambda text: None)
     assert (len(wait.here), wait.other, calls.read_text()) == (1, [], "called\n")

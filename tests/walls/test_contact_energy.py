@@ -5,8 +5,7 @@ import pytest
 
 from hardwall.model.axis import passivity
 from hardwall.sim.scene.load import load
-from hardwall.sim.walls import hit
-from stimuli.handle_paths import energies
+from stimuli.handle_paths import energies, path_of
 
 
 def contact(scene: str, stiffness: float, damping: float) -> tuple[float, float, float]:
@@ -16,14 +15,16 @@ def contact(scene: str, stiffness: float, damping: float) -> tuple[float, float,
         "protocol.settle_s": 0.3, "protocol.longest_s": 0.4, "protocol.mean_s": 0.1, "protocol.measure_s": 0.1,
     }  # fmt: skip
     loaded = load(scene, changes | ({"amplifier.delay_s": None} if scene == "seed-2011" else {}))
-    trace = hit.run(loaded, "fixed", True).detail
+    position_m, drives = path_of(loaded, "fixed")
+    near = int(np.argmax(position_m > -0.2e-3))
+    position_m, drives = (each[near : near + loaded.spec.sample_hz // 10] for each in (position_m, drives))
     q, r = loaded.encoder.count_m, loaded.spec.force_resolution_n
-    works = -trace.force_n[:-1] * np.diff(trace.position_m)
-    counts, drives = np.floor(trace.position_m / q).astype(int), np.rint(trace.force_n / r).astype(int)
+    works = -r * drives[:-1] * np.diff(position_m)
+    counts = np.floor(position_m / q).astype(int)
     d = passivity.Design(loaded.spec, loaded.spec.design.estimator.velocity)
     found = energies(d.params({"passivity_damping": 0}), counts.tolist(), drives.tolist())
-    entered = int(np.argmax(trace.position_m > 0))
-    left = entered + int(np.argmax(trace.position_m[entered:] < 0))
+    entered = int(np.argmax(position_m > 0))
+    left = entered + int(np.argmax(position_m[entered:] < 0))
     assert entered < left < len(works)
     return found[left] * r * q / 2, works[:left].sum(), np.abs(works[:left]).sum()
 

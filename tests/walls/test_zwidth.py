@@ -20,7 +20,7 @@ from hardwall.sim.scene.load import read
 from hardwall.sim.walls import mapping, methods, zwidth
 from hardwall.sim.walls.boundary import BoundaryPoint
 from stimuli import results
-from stimuli.lengths import long_form
+from stimuli.lengths import LONG, long_form
 from support.command_line import call
 from support.processes import HARDWALL, ended_by, session, started, stored, wait_until
 
@@ -257,9 +257,12 @@ def test_a_scene_of_a_file_need_not_be_there_any_more(tmp_path, map_of_one_threa
     assert [each.boundary for each in maps] == [each.boundary for each in map_of_one_thread]
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
-def test_an_interrupted_map_says_how_to_go_on(tmp_path, workers, number):
+INTERRUPTS = [("SIGINT", 1), ("SIGTERM", 2), *([("SIGINT", 2), ("SIGTERM", 1)] if LONG else ())]
+"""Signals and numbers of workers: each of both, and every pair of them by `make soak`."""
+
+
+@pytest.mark.parametrize(("number", "workers"), INTERRUPTS)
+def test_an_interrupted_map_says_how_to_go_on(tmp_path, number, workers):
     (tmp_path / "numba").symlink_to(build_dir() / "numba")
     with started(HARDWALL, "zwidth", "--workers", workers, "--json", HARDWALL_BUILD=str(tmp_path)) as process:
         wait_until(lambda: len(stored(tmp_path)) > 1)
