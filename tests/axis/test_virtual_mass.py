@@ -113,7 +113,7 @@ async def the_force_is_0_after_reset_and_constant_from_one_valid_to_the_next(dut
         assert before
 
 
-@pytest.mark.parametrize(("name", "estimator", "most_kg", "behind"), some_of(SIZES, 1, 2))
+@pytest.mark.parametrize(("name", "estimator", "most_kg", "behind"), some_of(SIZES, 1))
 def test_rtl(name, estimator, most_kg, behind):
     simulate(__file__, make, name=name, estimator=estimator, most_kg=most_kg, behind=behind)
 

@@ -195,7 +195,7 @@ SIZES = [
 ]
 
 
-@pytest.mark.parametrize(("name", "estimator", "after", "coupling"), some_of(SIZES, 1, 2, 4))
+@pytest.mark.parametrize(("name", "estimator", "after", "coupling"), some_of(SIZES, 1, 4))
 def test_rtl(name, estimator, after, coupling):
     simulate(__file__, make, name=name, estimator=estimator, after=after, coupling=coupling)
 
