@@ -53,7 +53,7 @@ async def follows_model(dut):
     await follow(dut, Powers(DESIGNS[parameters()["name"]]), term, momentary=("size",))
 
 
-@pytest.mark.parametrize("name", some_of([*DESIGNS], 2, 3))
+@pytest.mark.parametrize("name", some_of([*DESIGNS], 2))
 def test_rtl(name):
     simulate(__file__, lambda name: Powers(DESIGNS[name]), name=name)
 

@@ -8,6 +8,7 @@ import pytest
 from hardwall.hdl.arithmetic.signed_divide import SignedDivide
 from hardwall.model.arithmetic.signed_divide import divide
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
+from stimuli.lengths import some_of
 
 
 def make(**sizes: int) -> SignedDivide:
@@ -59,15 +60,14 @@ async def a_start_while_busy_abandons_the_quotient_in_hand(dut):
     assert outputs.rows == [(1 << component.fraction,)] * (component.latency - 1)
 
 
-@pytest.mark.parametrize(
-    "sizes",
-    [
-        {"dividend_width": 20, "divisor_width": 11, "fraction": 18, "quotient_bits": 21},
-        # The counter of steps needs one more bit when the additional steps are counted too.
-        {"dividend_width": 5, "divisor_width": 9, "fraction": 11, "quotient_bits": 14},
-    ],
-    ids=["wide", "small dividend"],
-)
+SIZES = {
+    "wide": {"dividend_width": 20, "divisor_width": 11, "fraction": 18, "quotient_bits": 21},
+    # The counter of steps needs one more bit when the additional steps are counted too.
+    "small dividend": {"dividend_width": 5, "divisor_width": 9, "fraction": 11, "quotient_bits": 14},
+}
+
+
+@pytest.mark.parametrize("sizes", some_of(SIZES.values(), 1), ids=some_of(SIZES, 1))
 def test_rtl(sizes):
     simulate(__file__, make, **sizes)
 

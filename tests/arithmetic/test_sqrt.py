@@ -83,7 +83,7 @@ async def every_digit_is_told_as_it_is_made(dut):
     assert {reached for reached, *_ in told} == {0, 1, 3, 7} or component.width <= 3
 
 
-@pytest.mark.parametrize("width", some_of([1, 2, 3, 16, 35], 0, 4))
+@pytest.mark.parametrize("width", some_of([1, 2, 3, 16, 35], 4))
 def test_rtl(width):
     simulate(__file__, Sqrt, width=width)
 

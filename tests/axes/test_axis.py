@@ -118,7 +118,7 @@ def check_strobes(spec: AxesSpec, seen: Seen) -> None:
 async def every_axis_is_a_single_one(dut):
     spec, random = rota(**parameters()), rng()
     bench = Bench(dut, Axes(spec))
-    clocks, rose, drives = max(SAMPLES, REACHING) // 200 * spec.clocks_per_sample, 0, []
+    clocks, rose, drives = max(SAMPLES, REACHING) // (200 if WHOLE else 400) * spec.clocks_per_sample, 0, []
     await bench.reset()
     # The second run begins with a reset amid the first.
     for _ in range(2):

@@ -85,7 +85,7 @@ async def every_axis_has_its_bank_and_its_state(dut):
     assert host.pulses == [0] * axes
 
 
-@cocotb.test()
+@cocotb.test(skip=not WHOLE)
 async def one_axis_trips_while_the_other_drives_on(dut):
     host = Host(dut, **parameters())
     await host.reset()
@@ -338,7 +338,7 @@ async def a_capture_has_the_samples_of_the_axis_that_was_chosen(dut):
     assert (await host.look(1))["state"] == ARMED
 
 
-@cocotb.test()
+@cocotb.test(skip=not WHOLE)
 async def a_loop_stops_every_axis(dut):
     host = Host(dut, **parameters())
     await host.reset()

@@ -26,7 +26,7 @@ ENOUGH = 400
 
 
 def make() -> Recorded:
-    return Recorded(SupervisedAxes(slow(AXES, "fdm", spare=2)))
+    return Recorded(SupervisedAxes(slow(AXES, "levant", spare=2)))
 
 
 class Device:

@@ -25,7 +25,7 @@ from stimuli.places import place
 PINS, OUTPUTS = clocked.Pins._fields, clocked.Outputs._fields
 MASS_KG = 0.05
 """The largest virtual mass, where there is one."""
-LATE_BIT = 20
+LATE_BIT = 20 if WHOLE else 18
 """The bit of a clock's number that the others' numbers have not; the top bit where a stamp has fewer."""
 STROBES = "commit", "preload", "clear_flags", "index_arm", "origin_shift", "slip"
 ACTS, CHANCES = ("", "words", "drive_enable", *STROBES), (0.958, 0.006, 0.006, *[0.005] * len(STROBES))

@@ -8,6 +8,7 @@ from cocotb.triggers import RisingEdge, Timer
 from hardwall.hdl.axis.axis import Axis
 from hardwall.testing import Bench, parameters, simulate
 from stimuli.emissions import Emission
+from stimuli.lengths import some_of
 from stimuli.specs import spec
 
 BURSTS, IN_A_BURST, PERIOD, APART = 6, 5, 2500, 20
@@ -49,6 +50,6 @@ async def an_estimate_is_none_from_the_third_burst_on(dut):
     assert axis.design.flag_names(int(dut.flags.value)) == ["edges_in_bursts"]
 
 
-@pytest.mark.parametrize("estimator", ["edge-kalman", "period"])
+@pytest.mark.parametrize("estimator", some_of(["edge-kalman", "period"], 1))
 def test_rtl(estimator):
     simulate(__file__, make, estimator=estimator)

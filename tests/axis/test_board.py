@@ -76,13 +76,11 @@ async def random_capture(host: Host) -> None:
 
 def lacks(host: Host, seen: list[dict[str, int]]) -> list[str]:
     """Return the cases that a campaign has not reached yet."""
-    cases = {
-        "states": {DISARMED, ARMED, TRIPPED} == {row["state"] for row in seen},
-        "pulses": {(pulse, sign) for pulse in (0, 1) for sign in (0, 1)} == set(host.pulses),
-    }
-    # Other tests here have an index and captures that are sure to come.
+    cases = {"states": {DISARMED, ARMED, TRIPPED} == {row["state"] for row in seen}}
+    # Other tests, here and of the stages, have pulses, an index and captures that are sure to come.
     if WHOLE:
         cases |= {
+            "pulses": {(pulse, sign) for pulse in (0, 1) for sign in (0, 1)} == set(host.pulses),
             "index": {0, 1} == {row["index_latched"] for row in seen},
             "captures": {WAITING, DONE} <= {row.get("capture_state") for row in seen},
         }
@@ -130,13 +128,14 @@ async def a_random_host_at_a_random_handle(dut):
         else:
             await host.write(disarm=1)
     assert lacks(host, seen) == []
-    await find_the_index_twice(host, seen)
+    if WHOLE:
+        await find_the_index_twice(host, seen)
+        assert {row["referenced"] for row in seen} == {0, 1}
     # An axis without a heartbeat, or one that is armed, is not armed.
     for _ in range(2):
         await host.write(arm=1)
     assert host.refused
     assert set(host.refused) == {FAILURE}
-    assert {row["referenced"] for row in seen} == {0, 1}
 
 
 async def find_the_index_twice(host: Host, seen: list[dict[str, int]]) -> None:
@@ -230,7 +229,7 @@ async def a_capture_begins_with_the_count_that_passes_its_level(dut):
     assert status["capture_place"] == RECORDS // 4
 
 
-@cocotb.test()
+@cocotb.test(skip=not WHOLE)
 async def a_capture_begins_with_the_force_of_the_wall(dut):
     host = Host(dut, **parameters())
     await host.reset()
@@ -269,7 +268,7 @@ async def an_answer_waits_for_the_drive_of_what_it_wrote(dut):
         assert await waited >= 3
 
 
-@cocotb.test()
+@cocotb.test(skip=not WHOLE)
 async def what_trips_first_is_shown(dut):
     host = Host(dut, **parameters())
     await host.reset()
@@ -353,7 +352,7 @@ async def a_host_is_not_answered_before_the_drive_is_of_the_new_place_and_the_ne
     half = 1 << host.twin.spec.count_width - 1
     words = {"wall_stiffness": host.registers["wall_stiffness"].high, "wall_position": 0, "wall_left": 0}
     await host.write(commit=1, **words, preload_count=half // 2)
-    for name in ("preload", "origin_shift"):
+    for name in some_of(("preload", "origin_shift"), 1):
         await host.write(preload=1, commit=1, preload_count=half // 2)
         assert host.shown()["drive"] < 0
         await host.write(commit=1, preload_count=-half // 2 if name == "preload" else -half)
@@ -421,7 +420,7 @@ async def every_word_reaches_the_axis(dut):
     registers = host.registers
     pulses = [pulse.name for pulse in registers.pulses if pulse.name not in {*EXCLUSIVE} - {"commit"}]
     restless = {word.name: Restless(word, host.random) for word in (*registers.words, *registers.live)}
-    for moves in ("preload", "origin_shift") * 2:
+    for moves in ("preload", "origin_shift") * (2 if WHOLE else 1):
         drawn = {name: values.next() for name, values in restless.items()}
         await host.write(**{word.name: drawn[word.name] for word in registers.live})
         words = {word.name: drawn[word.name] for word in registers.words}

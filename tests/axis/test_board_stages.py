@@ -11,7 +11,7 @@ from hardwall.testing import parameters, simulate
 from oracles.board import STAGES, make
 from oracles.board_host import Host
 from oracles.supervised import SYNCHRONISER
-from stimuli.lengths import LONG, some_of
+from stimuli.lengths import LONG, WHOLE, some_of
 
 SAFE = {
     "pdm": {"drive_pdm": 0},
@@ -78,7 +78,7 @@ async def an_open_loop_makes_the_pins_safe(dut):
     assert all({pins[number] for pins in seen} == {0, 1} for number in range(len(host.pulses[0])))
 
 
-@cocotb.test()
+@cocotb.test(skip=not WHOLE)
 async def a_disarm_makes_the_pins_safe(dut):
     pusher = Pusher(dut)
     await pusher.reset()

@@ -20,7 +20,7 @@ from hardwall.model.estimators.registry import ESTIMATORS
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from stimuli.borne import Borne
-from stimuli.lengths import some_of
+from stimuli.lengths import LONG, some_of
 from stimuli.magnitudes import magnitudes
 from stimuli.specs import spec
 
@@ -113,7 +113,7 @@ async def the_force_is_0_after_reset_and_constant_from_one_valid_to_the_next(dut
         assert before
 
 
-@pytest.mark.parametrize(("name", "estimator", "most_kg", "behind"), some_of(SIZES, 1, 2))
+@pytest.mark.parametrize(("name", "estimator", "most_kg", "behind"), some_of(SIZES, 1))
 def test_rtl(name, estimator, most_kg, behind):
     simulate(__file__, make, name=name, estimator=estimator, most_kg=most_kg, behind=behind)
 
@@ -151,7 +151,7 @@ def test_fixed_point_is_within_a_force_lsb_of_float(name, estimator, most_kg, be
     assert compared > 5_000
 
 
-@pytest.mark.parametrize("estimator", ACCELERATED)
+@pytest.mark.parametrize("estimator", ACCELERATED if LONG else ["kalman", "levant-2", "edge-kalman"])
 def test_no_mass_is_no_change(estimator):
     """An axis with both masses at 0 is the axis without the block, but for its latency."""
     counts = np.cumsum(rng().integers(-1, 2, 5_000))

@@ -296,7 +296,7 @@ async def no_word_is_the_next_after_a_reset(dut):
     world = World(dut)
     await world.reset()
     await world.live()
-    for place in range(TELEMETRY, COUNTERS, 2 if WHOLE else 6):
+    for place in range(TELEMETRY, COUNTERS, 2 if WHOLE else 12):
         await world.read(place - 2)
         await world.restart()
         await world.read(place)

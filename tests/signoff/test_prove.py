@@ -23,8 +23,11 @@ from signoff.proofs.widths import Widths, extremes, range_of_product
 from stimuli.lengths import LONG
 
 QUICK = [known for known in properties.PROPERTIES if known.quick]
-PROVEN = QUICK if LONG else list({known.block.split()[0]: known for known in reversed(QUICK)}.values())
-"""The quick ones, of which the short form proves the first of each kind of block."""
+CHOSEN = "sqrt", "output", "supervisor", "drive", "axis"
+"""Arithmetic, a stage of the force, a machine of states, pins, and a whole axis: an induction of 2 to 5 clocks."""
+FIRST = {known.block.split()[0]: known for known in reversed(QUICK)}
+PROVEN = QUICK if LONG else [FIRST[kind] for kind in CHOSEN]
+"""The quick ones, of which the short form proves the first of each block that is chosen."""
 
 
 class Sum(wiring.Component):
