@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 VIRTUAL = "virtual"
 """The word for a board in simulation."""
 SCENE = "seed-2011"
-"""The default scene of a board in simulation, with a clock at which it runs at about real speed."""
+"""The default scene of a board in simulation."""
 
 
 class Place(NamedTuple):
@@ -56,9 +56,7 @@ def command(
     ],
     scene: Annotated[
         str | None,
-        typer.Argument(
-            metavar="SCENE", help="scene of the board in simulation", show_default=f"{SCENE}, with a clock of 4 MHz"
-        ),
+        typer.Argument(metavar="SCENE", help="scene of the board in simulation", show_default=SCENE),
     ] = None,
     estimator: EstimatorOption = None,
     set_: SetOption = None,
@@ -92,7 +90,7 @@ def command(
             raise BadInput("--baud and --pace are for a board at a port, not for `hardwall panel virtual`")
         from .virtual_bench import bench_of  # noqa: PLC0415  (a board at a port needs no simulation)
 
-        with bench_of(scene or SCENE, estimator, set_, identity, paced=scene is None) as board:
+        with bench_of(scene or SCENE, estimator, set_, identity) as board:
             try:
                 _serve(board.connect, board, f"{board.name}, virtual", place, seconds)
             except PortError:

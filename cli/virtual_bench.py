@@ -19,8 +19,6 @@ from ..sim.scene.schema import Scene
 from .scenes import changes_of
 from .virtual import COUNTS
 
-CLOCK, CLOCK_HZ = "controller.clock_hz", 4_000_000
-"""The clock at which `seed-2011` runs at about the pace of the real board."""
 WALL = {"wall_stiffness": 2000.0, "wall_damping": 10.0, "wall_position": 5e-3, "supervisor_force_limit": 20.0}
 """The words written to it at the beginning: a wall to feel."""
 GAINS = {"levant_lambda": 3.5, "levant_alpha": 13.2, "levant_output": 1.0}
@@ -32,7 +30,7 @@ PORT_LINE = "serial port: "
 
 @contextmanager
 def bench_of(
-    scene: str, estimator: str | None, set_: list[str] | None, identity: str | None, paced: bool
+    scene: str, estimator: str | None, set_: list[str] | None, identity: str | None
 ) -> Iterator["VirtualBench"]:
     """Provide the virtual board of a scene; it does not run yet.
 
@@ -40,13 +38,9 @@ def bench_of(
         scene: name or file of the scene.
         estimator, set_: the options of these names.
         identity: the identity that the board must have; None for any.
-        paced: whether the clock is `CLOCK_HZ` where `set_` has none.
     """
     changes = changes_of(set_, controller__estimator=estimator)
     words = [*_options("--set", set_ or []), *_options("--estimator", [estimator] if estimator else [])]
-    if paced and CLOCK not in changes:
-        changes[CLOCK] = CLOCK_HZ
-        words += ["--set", f"{CLOCK}={CLOCK_HZ}"]
     text = read(scene)
     of = parse(scene, text, changes)
     with _scene_file(of, text) as file, VirtualBench(scene, [str(file), *words], of, identity) as board:
