@@ -1,5 +1,6 @@
 // What is around a board in simulation: its clocks, the other end of its serial line, and the amplifier of its drive
-// stage, which is that of the macro STAGE_PDM, STAGE_PWM or STAGE_DAC. GUARDED and PERMITTED are signals inside the board. Like the axis's harness it makes any number of clocks for one change of `go`, in a single evaluation.
+// stage, which is that of the macro STAGE_PDM, STAGE_PWM or STAGE_DAC. GUARDED and PERMITTED are signals inside the board.
+// Like the axis's harness it makes any number of clocks for one change of `go`, in a single evaluation.
 //
 // Time is counted in ticks, the periods of the board's clock. The oscillator goes on where that clock stands.
 

@@ -108,6 +108,7 @@ void* board_open(int64_t number, int64_t turn, double bit_clocks) {
     // The reset goes through a synchroniser.
     context->run(2);
     context->clock = 0;
+    context->resting.forget();
     return context;
 }
 
@@ -186,6 +187,13 @@ void board_switch(void* address, int64_t number, int64_t on) {
 
 // Evaluate every clock from here on.
 void board_skip_nothing(void* address) { static_cast<Context*>(address)->resting.skips = false; }
+
+// Compare each skip with its clocks from here on, or return how many were compared, or how many of them were wrong.
+int64_t board_checked(void* address, int64_t what) {
+    auto& resting = static_cast<Context*>(address)->resting;
+    resting.checks = true;
+    return what ? resting.wrong : resting.checked;
+}
 
 // Return how many clocks were evaluated, of all that have passed.
 int64_t board_evaluated(void* address) { return static_cast<Context*>(address)->resting.evaluated; }

@@ -140,6 +140,10 @@ class BoardHardware:
         library.board_open.restype = ctypes.c_void_p
         library.board_open.argtypes = [ctypes.c_int64, ctypes.c_int64, ctypes.c_double]
         library.board_take.restype = library.board_waiting.restype = library.board_evaluated.restype = ctypes.c_int64
+        library.board_checked.restype, library.board_checked.argtypes = (
+            ctypes.c_int64,
+            [ctypes.c_void_p, ctypes.c_int64],
+        )
         library.board_waiting.argtypes = [ctypes.c_void_p]
         for name in ("board_send", "board_take"):
             getattr(library, name).argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64]
@@ -170,6 +174,11 @@ class BoardHardware:
     def skip_nothing(self) -> None:
         """Evaluate every clock from here on."""
         self._library.board_skip_nothing(ctypes.c_void_p(self._context))
+
+    def check_skips(self) -> tuple[int, int]:
+        """Compare each skip with its clocks from here on; return how many were compared, and how many differed."""
+        checked = self._library.board_checked
+        return checked(ctypes.c_void_p(self._context), 0), checked(ctypes.c_void_p(self._context), 1)
 
     @property
     def evaluated(self) -> int:

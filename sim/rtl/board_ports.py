@@ -45,9 +45,10 @@ def header(spec: AxisSpec, rest: BoardResting | None, oscillator_clocks: int) ->
         for number, counter in enumerate(found.counters)
         for name in _kept(counter.names)
     ]
-    exits = [member(name) for names in found.exits for name in names]
+    exits = [(number, member(name)) for number, names in enumerate(found.exits) for name in names]
     memories = [member(name) for name in found.memories]
-    names = dict.fromkeys([*(name for _, name, _, _ in counters), *exits, *memories, *_kept([board_resting.SUM])])
+    registers = [*(name for _, name, *_ in counters), *(name for _, name in exits), *_kept([board_resting.SUM])]
+    names = dict.fromkeys([*registers, *memories])
     # The beat comes again in two of its levels, the oscillator in two of its own.
     beat = 2 * clock_monitor.Design(spec.clock_hz).beat_clocks
     lists = {
@@ -60,7 +61,8 @@ def header(spec: AxisSpec, rest: BoardResting | None, oscillator_clocks: int) ->
         "STOPS": [
             f"STOP({number}, {name}, {mask}, {stop})" for number, name, mask, stops in counters for stop in stops
         ],
-        "EXITS": [f"EXIT({name})" for name in exits],
+        "EXIT_COUNT": [len(found.exits)],
+        "EXITS": [f"EXIT({number}, {name})" for number, name in exits],
         "MEMORIES": [f"MEMORY({name})" for name in memories],
     }
     return "".join(f"#define {name} {' '.join(map(str, items))}\n" for name, items in lists.items())

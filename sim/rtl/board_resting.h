@@ -39,8 +39,11 @@ class Resting {
    public:
     bool skips = SKIPS;
     int64_t evaluated = 0;  // of all clocks, those that were not skipped
+    // Whether what a skip gives is compared, to the last bit, with what the clocks give; and how often it was, and was wrong.
+    bool checks = false;
+    int64_t checked = 0, wrong = 0;
 
-    explicit Resting(Vboard& bench) : bench(bench), now(*bench.rootp), states(3 * sizeof(State)) {
+    explicit Resting(Vboard& bench) : bench(bench), now(*bench.rootp), states(3) {
 #define COUNTER(number, member, mask) \
     if (find_##member(now, 0)) known |= 1 << number;
         COUNTERS
@@ -56,7 +59,8 @@ class Resting {
         memories.resize(2 * memory_bytes);
     }
 
-    // The inputs may have changed: what they change goes through the decoder, or the receiver, before anything rests.
+    // The inputs may have changed. What they change goes through the decoder, or the receiver: for speed alone it is not
+    // looked at for so long whether anything rests.
     void begin() {
         kept = matched = 0;
         settle = SETTLE;
@@ -75,18 +79,18 @@ class Resting {
             const int64_t some = std::min(until - clock, until_stop() - 1) & ~int64_t{1};
             kept = matched = 0;
             if (some > 0) {
-                skip(clock, some);
+                checks ? check_skip(clock, some) : skip(clock, some);
                 patience = PATIENCE, pause = PAUSE;
                 return some;
             }
         }
-        if (round_length > ROUND && settle > 0) {
+        if (knows_round() && settle > 0) {
             const int64_t some = std::min(until - clock, settle);
-            settle = 0;
+            kept = matched = settle = 0;
             return evaluate(some);
         }
         // What does not rest for long is not looked at for as long.
-        if (round_length > ROUND && --patience < 0) {
+        if (knows_round() && --patience < 0) {
             const int64_t some = std::min(until - clock, pause);
             pause = std::min(2 * pause, PAUSE << 6);
             patience = PATIENCE;
@@ -104,7 +108,10 @@ class Resting {
     Vboard& bench;
     State& now;
     // The last two states, and a third to compare; the pieces of a state without its memories; and the memories.
-    std::vector<unsigned char> states;
+    struct alignas(State) Room {
+        unsigned char bytes[sizeof(State)];
+    };
+    std::vector<Room> states;
     std::vector<std::pair<size_t, size_t>> pieces, left_out;
     std::vector<unsigned char> memories;
     size_t memory_bytes = 0;
@@ -116,8 +123,8 @@ class Resting {
     std::vector<unsigned char> round = std::vector<unsigned char>(ROUND * MEMBER_BYTES);
     int64_t round_length = 0;
 
-    State& state(int64_t clock) { return reinterpret_cast<State&>(states[(clock & 1) * sizeof(State)]); }
-    State& compared() { return reinterpret_cast<State&>(states[2 * sizeof(State)]); }
+    State& state(int64_t clock) { return reinterpret_cast<State&>(states[clock & 1]); }
+    State& compared() { return reinterpret_cast<State&>(states[2]); }
 
     // Leave a member out of `pieces`; with nullptr at last, make them.
     void leave_out(void* member, size_t bytes) {
@@ -154,18 +161,22 @@ class Resting {
         }
     }
 
-    // What the rest of the board sees of the monitor of the clock: the address, or none.
+    // Whether all is found that the rest of the board sees of the monitor of the clock.
     bool seen() {
-        bool found = false;
-#define EXIT(member) found = found || find_##member(now, 0);
+        int found = 0;
+#define EXIT(number, member) \
+    if (find_##member(now, 0)) found |= 1 << number;
         EXITS
 #undef EXIT
-        return found;
+        return found == (1 << EXIT_COUNT) - 1;
     }
+
+    // Whether the round is known: each of its states came again, and what is seen of it did not change.
+    bool knows_round() const { return round_length > ROUND; }
 
     bool exits_equal(State& one, State& other) {
         bool same = true;
-#define EXIT(member) \
+#define EXIT(number, member) \
     if (auto* value = find_##member(one, 0)) same = same && *value == *find_##member(other, 0);
         EXITS
 #undef EXIT
@@ -191,7 +202,7 @@ class Resting {
         bench.go = !bench.go;
         bench.eval();
         evaluated += some;
-        if (some != 1 && round_length <= ROUND) round_length = 0;
+        if (some != 1 && !knows_round()) round_length = 0;
         return some;
     }
 
@@ -223,13 +234,14 @@ class Resting {
         if (auto* value = find_##member(now, 0)) if (*value == stop || *find_##member(before, 0) == stop) return false;
         STOPS
 #undef STOP
-        return stood == standing && (stood | ran) == known;
+        return stood == standing && (stood ^ ran) == known && !(stood & ran);
     }
 
     // Return whether the amplifier has got what it did in the clocks before: a step a clock, or a step a pulse.
     bool summed(State& before) {
         const int64_t got = static_cast<int64_t>(now.given - before.given);
 #if SUM_BITS
+        // A clock gives the step of the state before it; the pulse is an output, so states with another are not alike.
         const int64_t added = total(now) - low(total(before));
         if (kept == 1) amount = added, step = static_cast<int32_t>(bench.pulse);
         return added == amount && static_cast<int32_t>(bench.pulse) == step &&
@@ -270,7 +282,8 @@ class Resting {
             if (matched == MATCHES) {
                 copy_memories(memories.data() + memory_bytes);
                 if (std::memcmp(memories.data(), memories.data() + memory_bytes, memory_bytes)) matched = 0;
-                if (round_length <= ROUND) matched = MATCHES - 1;
+                // The memories were the same from two clocks after the first state on; they are compared again then.
+                if (!knows_round()) matched = std::min(matched, MATCHES - 1);
             }
         } else if (!like_before) {
             matched = 0;
@@ -279,9 +292,9 @@ class Resting {
         kept = like_before ? 2 : bench.guarded ? 0 : 1;
     }
 
-    // Learn the round of the monitor: known once each of its states came again, and what is seen of it did not change.
+    // Learn the round of the monitor.
     void go_round(int64_t clock, State& before) {
-        if (round_length > ROUND) return;
+        if (knows_round()) return;
         unsigned char* place = &round[clock % ROUND * MEMBER_BYTES];
         bool again = kept != 0 && exits_equal(before, now);
 #define MEMBER(member)                                                         \
@@ -291,6 +304,16 @@ class Resting {
         MEMBERS
 #undef MEMBER
         round_length = again ? round_length + 1 : 0;
+    }
+
+    void check_skip(int64_t clock, int64_t some) {
+        std::vector<unsigned char> before(bytes_of(now), bytes_of(now) + sizeof(State));
+        skip(clock, some);
+        const std::vector<unsigned char> skipped(bytes_of(now), bytes_of(now) + sizeof(State));
+        std::memcpy(bytes_of(now), before.data(), sizeof(State));
+        for (int64_t clocks = 0; clocks < some; ++clocks) evaluate(1);
+        ++checked;
+        wrong += std::memcmp(bytes_of(now), skipped.data(), sizeof(State)) != 0;
     }
 
     void skip(int64_t clock, int64_t some) {

@@ -5,8 +5,9 @@ from contextlib import ExitStack
 
 import numpy as np
 import pytest
-from amaranth.hdl import Module, Mux, Signal
+from amaranth.hdl import Cat, ClockDomain, Module, Mux, Signal
 from amaranth.lib import wiring
+from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from hardwall.hdl.axis.board import Board
@@ -112,6 +113,23 @@ def _sum_taken(m, c):
         m.d.sync += c.other.eq(1)
 
 
+def _slow_clock(m, c):
+    m.domains.oscillator = oscillator = ClockDomain(reset_less=True)
+    m.d.comb += oscillator.clk.eq(c.edge)
+    m.d.oscillator += c.other.eq(c.other + 1)
+
+
+def _written_in_parts(m, c):
+    m.submodules.kept = kept = Memory(shape=8, depth=2, init=[])
+    write = kept.write_port(granularity=4)
+    m.d.comb += [write.data.eq(c.stamp), write.en.eq(Cat(c.edge, c.amount[0]))]
+
+
+def _read_at_once(m, c):
+    m.submodules.kept = kept = Memory(shape=8, depth=2, init=[])
+    m.d.comb += [kept.write_port().en.eq(c.edge), c.other.eq(kept.read_port(domain="comb").data)]
+
+
 def _beat_of_the_edge(m, c):
     with m.If(c.edge):
         m.d.sync += c.beat.eq(0)
@@ -125,6 +143,9 @@ def _beat_of_the_edge(m, c):
         (_shown, "the output other depends on a counter"),
         (_sum_shown, "stage.total reaches more than its pin"),
         (_sum_taken, "stage.total reaches more than its pin"),
+        (_slow_clock, "it has more clocks than the monitor of its clock needs"),
+        (_written_in_parts, "kept is written in parts"),
+        (_read_at_once, "kept is read without a clock"),
         (_beat_of_the_edge, "the monitor of the clock follows from more than clocks"),
     ],
 )
@@ -173,13 +194,17 @@ def _advance(board: BoardHardware, clocks: np.ndarray, levels: np.ndarray, until
 
 @pytest.mark.parametrize("stage", WALKED)
 def test_a_board_that_skips_does_what_one_does_that_does_not(stage):
-    """Its pins are looked at after runs of any length: in rests, at strobes, in frames, at edges, faults and stops."""
+    """Its pins are looked at after runs of any length: in rests, at strobes, in frames, at edges, faults and stops.
+
+    Each skip of a third one is compared with its clocks, in all that Verilator keeps.
+    """
     spec, random = load("seed-2011", BOARDS[stage]).spec, rng()
     design, every = Design(Board(spec).registers), spec.clocks_per_sample
-    number, until, seen = 0, 0, [[], []]
+    number, until, seen, stood = 0, 0, [[], [], []], 0
     with ExitStack() as stack:
         both = [stack.enter_context(BoardHardware(spec, 0, 64)) for _ in seen]
         both[0].skip_nothing()
+        both[2].check_skips()
         for _ in range(STEPS):
             run = int(
                 random.choice((1, 7, every // 3, every, 5 * every, 60 * every), p=(0.2, 0.2, 0.2, 0.2, 0.15, 0.05))
@@ -192,18 +217,23 @@ def test_a_board_that_skips_does_what_one_does_that_does_not(stage):
             until += run
             request = framed(b"\1" + random_request(random, design)) if random.random() < 0.1 else b""
             wire = (str(random.choice(WIRES)), str(random.choice(LEVELS, p=(0.85, 0.05, 0.05, 0.05))))
-            switch = (str(random.choice(SWITCHES)), bool(random.random() < 0.9))
-            broken = random.random(2)
+            loop, broken = str(random.choice(SWITCHES[:3])), random.random(2)
+            stands = random.random() < 0.05
+            stood += stands
             for board, read in zip(both, seen, strict=True):
                 if request and not board.waiting:
                     board.send(request)
                 if broken[0] < 0.02:
                     board.wire(*wire)
-                if broken[1] < 0.02:
-                    board.switch(*switch)
+                if broken[1] < 0.04:
+                    board.switch(loop, bool(broken[1] > 0.01))
+                board.switch("clock", not stands)
                 read.append(_advance(board, clocks, levels, until))
-        evaluated = [board.evaluated for board in both]
-    assert [at for at, (all_of_them, some) in enumerate(zip(*seen, strict=True)) if all_of_them != some] == []
+        evaluated, (checked, wrong) = [board.evaluated for board in both], both[2].check_skips()
+    assert [at for at, (every, *others) in enumerate(zip(*seen, strict=True)) if others != [every, every]] == []
+    assert wrong == 0
+    assert (checked > STEPS) == (stage != "pwm")
+    assert stood > STEPS // 40
     assert len(b"".join(sent for _, sent in seen[0])) > 0.5 * STEPS
     assert evaluated[0] >= until
     assert (evaluated[1] < evaluated[0]) == (stage != "pwm")
