@@ -14,7 +14,7 @@ from hardwall.sim.scene.load import load
 from hardwall.sim.studies.bench import under_cocotb
 from hardwall.sim.walls import hit
 from stimuli.bristles import DAHL_KEYS, LUGRE_KEYS
-from stimuli.handle_paths import path_of
+from stimuli.hit_paths import path_of
 from stimuli.lengths import LONG, long_form
 from stimuli.outputs import EVERY_OUTPUT
 from stimuli.scenes import AMPLIFIER, CABLE, DRIVE, HAND, ONE_SECOND, SHUNT, TWO_SECONDS

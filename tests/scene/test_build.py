@@ -14,7 +14,7 @@ from hardwall.sim.world.converter import AS_IT_IS, Converter, Pulse
 from hardwall.sim.world.device import Device, Hand, Motor, Shunt, Transmission, train
 from hardwall.sim.world.rigid import Rigid
 from hardwall.sim.world.taylor import Train
-from stimuli.handle_paths import path_of
+from stimuli.hit_paths import path_of
 from stimuli.scenes import AMPLIFIER, CABLE, DRIVE, HAND, ONE_SECOND, PULSES, SHUNT
 
 

@@ -1,27 +1,6 @@
 """Ways of a handle under a drive, and the energy that a passivity controller's observer sees on them."""
 
-import numpy as np
-import pytest
-
 from hardwall.model.axis import passivity
-from hardwall.sim.scene.schema import Scene
-from hardwall.sim.walls import hit
-from hardwall.sim.walls.hit_statistics import Tally
-
-
-def path_of(scene: Scene, backend: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return position (m) and drive (force LSB) at every sample of a hit, by the loop that keeps no traces."""
-    kept, add = [], Tally.add
-
-    def added(tally: Tally, first: int, positions: np.ndarray, drives: np.ndarray) -> None:
-        kept.append((positions.copy(), drives.copy()))
-        add(tally, first, positions, drives)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Tally, "add", added)
-        hit.run(scene, backend)
-    positions, drives = map(np.concatenate, zip(*kept, strict=True))
-    return positions, drives
 
 
 def energies(params: passivity.Params, counts: list[int], drives: list[int]) -> list[int]:

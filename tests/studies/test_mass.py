@@ -13,7 +13,7 @@ from hardwall.sim.studies import mass
 from hardwall.sim.walls import hit
 from hardwall.sim.walls.methods import Curve
 from stimuli import results
-from stimuli.handle_paths import path_of
+from stimuli.hit_paths import path_of
 from stimuli.lengths import LONG, some_of
 from support.command_line import call
 from support.reports import check

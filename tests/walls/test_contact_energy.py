@@ -5,7 +5,8 @@ import pytest
 
 from hardwall.model.axis import passivity
 from hardwall.sim.scene.load import load
-from stimuli.handle_paths import energies, path_of
+from stimuli.handle_paths import energies
+from stimuli.hit_paths import path_of
 
 
 def contact(scene: str, stiffness: float, damping: float) -> tuple[float, float, float]:
