@@ -179,7 +179,7 @@ void board_switch(void* address, int64_t number, int64_t on) {
     if (number == 0) bench.drive_enable = on;
     if (number == 1) bench.external_fault = on;
     if (number == 2) bench.emergency_stop = on;
-    if (number == 3) {
+    if (number == 3 && bench.stopped != !on) {
         bench.stopped = !on;
         static_cast<Context*>(address)->resting.forget();
     }

@@ -74,6 +74,8 @@ def check(netlist: nir.Netlist) -> BoardResting:
 class _BoardCheck(NetlistCheck):
     def board(self) -> BoardResting:
         self._guards: dict[str, None] = {}
+        if any(len(counter) < LOWEST for counter in self._counters.values()):
+            raise RestsNotError(f"a counter has fewer than {LOWEST} bits")
         self._sum = next((value for value, names in self._names.items() if SUM in names), None)
         sum_bits = len(self._sum) - 1 if self._sum is not None and self._is_sum(self._sum) else 0
         for number, cell in enumerate(self._cells):

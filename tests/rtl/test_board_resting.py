@@ -130,6 +130,13 @@ def _read_at_once(m, c):
     m.d.comb += [kept.write_port().en.eq(c.edge), c.other.eq(kept.read_port(domain="comb").data)]
 
 
+def _counts_one_bit(m, c):
+    m.submodules.axis = axis = Module()
+    axis.submodules.supervisor = supervisor = Module()
+    pump = Signal(name="pump")
+    supervisor.d.sync += pump.eq(pump + 1)
+
+
 def _beat_of_the_edge(m, c):
     with m.If(c.edge):
         m.d.sync += c.beat.eq(0)
@@ -146,6 +153,7 @@ def _beat_of_the_edge(m, c):
         (_slow_clock, "it has more clocks than the monitor of its clock needs"),
         (_written_in_parts, "kept is written in parts"),
         (_read_at_once, "kept is read without a clock"),
+        (_counts_one_bit, "a counter has fewer than 2 bits"),
         (_beat_of_the_edge, "the monitor of the clock follows from more than clocks"),
     ],
 )
@@ -202,9 +210,9 @@ def test_a_board_that_skips_does_what_one_does_that_does_not(stage):
     design, every = Design(Board(spec).registers), spec.clocks_per_sample
     number, until, seen, stood = 0, 0, [[], [], []], 0
     with ExitStack() as stack:
-        both = [stack.enter_context(BoardHardware(spec, 0, 64)) for _ in seen]
-        both[0].skip_nothing()
-        both[2].check_skips()
+        boards = [stack.enter_context(BoardHardware(spec, 0, 64)) for _ in seen]
+        boards[0].skip_nothing()
+        boards[2].check_skips()
         for _ in range(STEPS):
             run = int(
                 random.choice((1, 7, every // 3, every, 5 * every, 60 * every), p=(0.2, 0.2, 0.2, 0.2, 0.15, 0.05))
@@ -220,7 +228,7 @@ def test_a_board_that_skips_does_what_one_does_that_does_not(stage):
             loop, broken = str(random.choice(SWITCHES[:3])), random.random(2)
             stands = random.random() < 0.05
             stood += stands
-            for board, read in zip(both, seen, strict=True):
+            for board, read in zip(boards, seen, strict=True):
                 if request and not board.waiting:
                     board.send(request)
                 if broken[0] < 0.02:
@@ -229,7 +237,7 @@ def test_a_board_that_skips_does_what_one_does_that_does_not(stage):
                     board.switch(loop, bool(broken[1] > 0.01))
                 board.switch("clock", not stands)
                 read.append(_advance(board, clocks, levels, until))
-        evaluated, (checked, wrong) = [board.evaluated for board in both], both[2].check_skips()
+        evaluated, (checked, wrong) = [board.evaluated for board in boards], boards[2].check_skips()
     assert [at for at, (every, *others) in enumerate(zip(*seen, strict=True)) if others != [every, every]] == []
     assert wrong == 0
     assert (checked > STEPS) == (stage != "pwm")
